@@ -1,0 +1,3 @@
+//! Generates the kernels of every law in laws/.
+
+fn main() {}

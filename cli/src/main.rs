@@ -1,0 +1,3 @@
+//! The `tensormass` command.
+
+fn main() {}

@@ -1,0 +1,3 @@
+//! Law files: text in, checked energy out.
+
+pub mod ast;

@@ -1,0 +1,3 @@
+//! From a strain energy density to simulation kernels.
+
+pub mod law;

@@ -1,0 +1,1 @@
+//! Traits that generated kernels implement, and the kernels generated from `laws/`.

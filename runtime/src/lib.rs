@@ -1,0 +1,5 @@
+//! Runtime.
+
+pub mod mesh;
+pub mod scene;
+pub mod output;
