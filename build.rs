@@ -1,3 +1,5 @@
-//! Generates the kernels of every law in laws/.
+//! Generates the kernels of every law in `laws/`.
 
-fn main() {}
+fn main() {
+    tensormass_codegen::build("laws");
+}

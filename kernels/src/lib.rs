@@ -1,1 +1,31 @@
-//! Traits that generated kernels implement, and the kernels generated from `laws/`.
+//! Soft-body kernels generated from the strain energy densities in `laws/`, and the traits that they implement.
+//!
+//! Generated code implements [`Law`] for any [`Real`]: strain energy density W, first Piola-Kirchhoff stress
+//! P = dW/dG, its differential dP in a direction dG, the diagonal of the tangent, and the Cauchy stress. The loops in
+//! [`batch`] compose a law with the linear tetrahedron into nodal forces. [`laws`] lists what this build has.
+
+// Generated text names this crate as any other crate would.
+extern crate self as tensormass_kernels;
+
+pub mod batch;
+mod law;
+mod real;
+
+pub use law::{BatchKernels, Law, LawEntry, LawInfo, Operations, ParameterInfo, Structure};
+pub use real::Real;
+
+/// The kernels printed by the generator for this build.
+#[allow(missing_docs, unused_variables, clippy::all, unused_qualifications)] // generated text: its generator is tested instead
+pub mod generated {
+    include!(concat!(env!("OUT_DIR"), "/kernels.rs"));
+}
+
+/// Every law of this build, by name.
+pub fn laws() -> &'static [LawEntry] {
+    generated::LAWS
+}
+
+/// The law of this name.
+pub fn law(name: &str) -> Option<&'static LawEntry> {
+    laws().iter().find(|l| l.info.name == name)
+}

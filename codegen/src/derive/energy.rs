@@ -1,0 +1,245 @@
+//! Reads a law's energy into an expression over invariants, constants and stages.
+
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use num_traits::Zero;
+
+use crate::cas::Cas;
+use crate::expr::{Expr, Rational, Symbol};
+use crate::ir::Input;
+use crate::law::ast::{self, Law, Scalar, ScalarNode, Tensor, TensorNode};
+use crate::quantity::{Kind, Quantities, Value};
+
+use super::DeriveError;
+use super::strain::{Base, Invariant, Strain};
+
+/// A named value with more nodes than this becomes a stage of its own instead of being repeated where it is used.
+const INLINE_NODES: usize = 24;
+
+/// A symmetric tensor as a combination of the base tensors and the identity.
+#[derive(Clone)]
+struct Combination {
+    bases: Vec<(Base, Expr)>,
+    identity: Expr,
+}
+
+/// Reads expressions of one law.
+pub struct Energy<'a> {
+    cas: &'a mut Cas,
+    quantities: &'a mut Quantities,
+    strain: &'a mut Strain,
+    /// The symbols of the parameters' components, parameter by parameter.
+    parameters: Vec<Vec<Symbol>>,
+    known: HashMap<*const ScalarNode, Expr>,
+}
+
+impl<'a> Energy<'a> {
+    /// Registers the law's parameters.
+    pub fn new(law: &Law, cas: &'a mut Cas, quantities: &'a mut Quantities, strain: &'a mut Strain) -> Self {
+        let mut k = 0;
+        let mut parameters = Vec::new();
+        for p in &law.parameters {
+            let mut components = Vec::new();
+            for i in 0..p.len {
+                let name = if p.len == 1 { p.name.clone() } else { format!("{}{i}", p.name) };
+                components.push(quantities.add(name, Kind::Input(Input::Parameters, k)));
+                k += 1;
+            }
+            parameters.push(components);
+        }
+        Self { cas, quantities, strain, parameters, known: HashMap::new() }
+    }
+
+    /// The expression of a scalar.
+    pub fn scalar(&mut self, node: &Scalar) -> Result<Expr, DeriveError> {
+        let key = Rc::as_ptr(node);
+        if let Some(e) = self.known.get(&key) {
+            return Ok(e.clone());
+        }
+        let e = self.read(node)?;
+        self.known.insert(key, e.clone());
+        Ok(e)
+    }
+
+    fn read(&mut self, node: &Scalar) -> Result<Expr, DeriveError> {
+        let one = |n: i128| Rational::from_integer(n);
+        Ok(match &**node {
+            ScalarNode::Number(q) => Expr::Number(*q),
+            ScalarNode::Parameter { parameter, component } => self.parameters[*parameter][*component].into(),
+            ScalarNode::Invariant(i) => self.invariant(*i)?,
+            ScalarNode::Trace(t) => self.trace(t)?,
+            ScalarNode::Ddot(a, b) => self.ddot(a, b)?,
+            ScalarNode::Det(t) => self.det(t)?,
+            ScalarNode::Add(a, b) => self.scalar(a)? + self.scalar(b)?,
+            ScalarNode::Sub(a, b) => self.scalar(a)? - self.scalar(b)?,
+            ScalarNode::Mul(a, b) => self.scalar(a)? * self.scalar(b)?,
+            ScalarNode::Div(a, b) => self.scalar(a)? / self.scalar(b)?,
+            ScalarNode::Neg(a) => Expr::int(-1) * self.scalar(a)?,
+            ScalarNode::Powi(a, n) => self.scalar(a)?.pow(one((*n).into())),
+            ScalarNode::Powf(a, b) => {
+                let (a, b) = (self.scalar(a)?, self.scalar(b)?);
+                if !self.quantities.is_constant_expr(&b) {
+                    return Err(DeriveError::Unsupported(
+                        "an exponent depends on the strain; write the power as exp(exponent * ln(base))".into(),
+                    ));
+                }
+                Expr::Power(Box::new(a), Box::new(b))
+            }
+            ScalarNode::Ln(a) => Expr::Ln(Box::new(self.scalar(a)?)),
+            ScalarNode::Exp(a) => Expr::Exp(Box::new(self.scalar(a)?)),
+            ScalarNode::Sqrt(a) => self.scalar(a)?.pow(Rational::new(1, 2)),
+            ScalarNode::Select { left, right, then, otherwise } => {
+                let [left, right, then, otherwise] = [left, right, then, otherwise].map(|x| self.scalar(x));
+                let value = Value::Select { left: left?, right: right?, then: then?, otherwise: otherwise? };
+                self.quantity("select", value)
+            }
+            ScalarNode::Named(name, value) => {
+                let e = self.scalar(value)?;
+                let e = self.cas.normalize(&e)?;
+                if matches!(e, Expr::Number(_) | Expr::Symbol(_)) {
+                    e
+                } else if self.quantities.is_constant_expr(&e) || nodes(&e) > INLINE_NODES {
+                    self.quantity(name, Value::Expr(e))
+                } else {
+                    e
+                }
+            }
+        })
+    }
+
+    /// A new quantity: constant if everything that it reads is.
+    fn quantity(&mut self, name: &str, value: Value) -> Expr {
+        let constant = value.operands().into_iter().all(|e| self.quantities.is_constant_expr(e));
+        let kind = if constant { Kind::Constant(value) } else { Kind::Stage { value, partials: None } };
+        self.quantities.add(name, kind).into()
+    }
+
+    fn basic(&mut self, invariant: Invariant) -> Result<Expr, DeriveError> {
+        Ok(self.strain.invariant(self.cas, self.quantities, invariant)?.into())
+    }
+
+    fn invariant(&mut self, i: ast::Invariant) -> Result<Expr, DeriveError> {
+        let c: Tensor = Rc::new(TensorNode::C);
+        let two = Rational::from_integer(2);
+        Ok(match i {
+            ast::Invariant::I1 => self.trace(&c)?,
+            ast::Invariant::I2 => {
+                let e = Expr::ratio(1, 2) * (self.trace(&c)?.pow(two) - self.ddot(&c, &c)?);
+                self.cas.expand(&e)?
+            }
+            ast::Invariant::I3 => self.basic(Invariant::J)?.pow(two),
+            ast::Invariant::J => self.basic(Invariant::J)?,
+            ast::Invariant::I1bar => {
+                self.basic(Invariant::J)?.pow(Rational::new(-2, 3)) * self.invariant(ast::Invariant::I1)?
+            }
+            ast::Invariant::I2bar => {
+                self.basic(Invariant::J)?.pow(Rational::new(-4, 3)) * self.invariant(ast::Invariant::I2)?
+            }
+        })
+    }
+
+    fn tensor(&mut self, t: &Tensor) -> Result<Combination, DeriveError> {
+        let single = |base, factor| Combination { bases: vec![(base, factor)], identity: Expr::int(0) };
+        Ok(match &**t {
+            TensorNode::Eps => single(Base::Eps, Expr::int(1)),
+            TensorNode::E => single(Base::A, Expr::ratio(1, 2)),
+            TensorNode::C => Combination { identity: Expr::int(1), ..single(Base::A, Expr::int(1)) },
+            TensorNode::Identity => Combination { bases: vec![], identity: Expr::int(1) },
+            TensorNode::Add(a, b) => {
+                let (a, b) = (self.tensor(a)?, self.tensor(b)?);
+                combine(a, b)
+            }
+            TensorNode::Sub(a, b) => {
+                let (a, b) = (self.tensor(a)?, self.tensor(b)?);
+                combine(a, scale(&Expr::int(-1), b))
+            }
+            TensorNode::Scale(s, a) => {
+                let s = self.scalar(s)?;
+                scale(&s, self.tensor(a)?)
+            }
+        })
+    }
+
+    fn trace(&mut self, t: &Tensor) -> Result<Expr, DeriveError> {
+        let t = self.tensor(t)?;
+        let mut sum = vec![Expr::int(3) * t.identity];
+        for (base, factor) in t.bases {
+            sum.push(factor * self.basic(Invariant::Trace(base))?);
+        }
+        Ok(self.cas.normalize(&Expr::Sum(sum))?)
+    }
+
+    fn ddot(&mut self, a: &Tensor, b: &Tensor) -> Result<Expr, DeriveError> {
+        let (a, b) = (self.tensor(a)?, self.tensor(b)?);
+        let mut sum = vec![Expr::int(3) * (a.identity.clone() * b.identity.clone())];
+        for (x, fx) in &a.bases {
+            sum.push(fx.clone() * b.identity.clone() * self.basic(Invariant::Trace(*x))?);
+            for (y, fy) in &b.bases {
+                let (low, high) = (*x.min(y), *x.max(y));
+                sum.push(fx.clone() * fy.clone() * self.basic(Invariant::Ddot(low, high))?);
+            }
+        }
+        for (y, fy) in &b.bases {
+            sum.push(fy.clone() * a.identity.clone() * self.basic(Invariant::Trace(*y))?);
+        }
+        Ok(self.cas.normalize(&Expr::Sum(sum))?)
+    }
+
+    /// det (c I + s X) = c^3 + c^2 s tr X + c s^2 (tr(X)^2 - X:X) / 2 + s^3 det X.
+    fn det(&mut self, t: &Tensor) -> Result<Expr, DeriveError> {
+        if matches!(**t, TensorNode::C) {
+            return self.invariant(ast::Invariant::I3);
+        }
+        let t = self.tensor(t)?;
+        let power = |e: &Expr, n: i128| if n == 0 { Expr::int(1) } else { e.clone().pow(Rational::from_integer(n)) };
+        let c = t.identity;
+        let e = match t.bases.as_slice() {
+            [] => power(&c, 3),
+            [(base, s)] => {
+                let trace = self.basic(Invariant::Trace(*base))?;
+                let square = self.basic(Invariant::Ddot(*base, *base))?;
+                let det = self.basic(Invariant::Det(*base))?;
+                let second = Expr::ratio(1, 2) * (power(&trace, 2) - square);
+                power(&c, 3)
+                    + power(&c, 2) * s.clone() * trace
+                    + c.clone() * power(s, 2) * second
+                    + power(s, 3) * det
+            }
+            _ => {
+                return Err(DeriveError::Unsupported(
+                    "det of a sum of the small strain and a finite strain; write it by invariants of one of them".into(),
+                ));
+            }
+        };
+        Ok(self.cas.normalize(&e)?)
+    }
+}
+
+fn scale(s: &Expr, t: Combination) -> Combination {
+    Combination {
+        bases: t.bases.into_iter().map(|(b, f)| (b, s.clone() * f)).collect(),
+        identity: s.clone() * t.identity,
+    }
+}
+
+fn combine(a: Combination, b: Combination) -> Combination {
+    let mut bases = a.bases;
+    for (base, factor) in b.bases {
+        match bases.iter_mut().find(|(x, _)| *x == base) {
+            Some((_, f)) => *f = f.clone() + factor,
+            None => bases.push((base, factor)),
+        }
+    }
+    bases.retain(|(_, f)| !matches!(f, Expr::Number(q) if q.is_zero()));
+    Combination { bases, identity: a.identity + b.identity }
+}
+
+fn nodes(e: &Expr) -> usize {
+    match e {
+        Expr::Number(_) | Expr::Symbol(_) => 1,
+        Expr::Sum(xs) | Expr::Product(xs) => 1 + xs.iter().map(nodes).sum::<usize>(),
+        Expr::Power(a, b) => 1 + nodes(a) + nodes(b),
+        Expr::Ln(a) | Expr::Exp(a) => 1 + nodes(a),
+    }
+}

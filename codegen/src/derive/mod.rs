@@ -1,0 +1,248 @@
+//! From a law to its kernels, by formal differentiation: once for the stress, twice for its differential.
+//!
+//! Stages, each a set of named quantities over the one before:
+//! strain components (of G) -> invariants q_k -> W(q). The stress is collected backwards over these stages, S = dW/dE
+//! first, then P = F S + ..; every differential is the sum of partial derivatives times differentials, stage by stage
+//! (a staged tangent), so that no expression grows. The computer algebra system takes every partial derivative.
+
+mod differential;
+mod energy;
+mod strain;
+
+use std::collections::BTreeMap;
+
+use crate::cas::{Cas, UnexpectedTerm};
+use crate::derivation::Derivation;
+use crate::expr::{Expr, Symbol};
+use crate::ir::{Input, InvalidKernel, KernelIr, Output, Rational};
+use crate::law::ast::Law;
+use crate::lower::{Constants, Lowering};
+use crate::quantity::{Kind, Quantities, Value};
+
+use differential::Differential;
+use energy::Energy;
+use strain::{Invariant, Strain, SYMMETRIC};
+
+/// Why a law could not be differentiated.
+#[derive(Debug, thiserror::Error)]
+pub enum DeriveError {
+    /// The computer algebra system answered in unknown terms.
+    #[error(transparent)]
+    Cas(#[from] UnexpectedTerm),
+    /// The generated kernel breaks a rule of the language: a defect of the generator.
+    #[error("the generator made a kernel that it refuses itself (please report this): {0}")]
+    Invalid(#[from] InvalidKernel),
+    /// The law uses something that this version cannot differentiate.
+    #[error("{0}")]
+    Unsupported(String),
+}
+
+/// Differentiates a law.
+///
+/// # Errors
+/// See [`DeriveError`].
+pub fn derive(law: &Law) -> Result<Derivation, DeriveError> {
+    Session::new(law)?.derivation(law)
+}
+
+struct Session {
+    cas: Cas,
+    quantities: Quantities,
+    constants: Constants,
+    strain: Strain,
+    energy: Expr,
+    margin: Option<Expr>,
+}
+
+impl Session {
+    fn new(law: &Law) -> Result<Self, DeriveError> {
+        let mut cas = Cas::new();
+        let mut quantities = Quantities::default();
+        let mut strain = Strain::new(&mut quantities);
+        let mut reader = Energy::new(law, &mut cas, &mut quantities, &mut strain);
+        let energy = reader.scalar(&law.energy)?;
+        let margin = match &law.domain {
+            Some(domain) => {
+                let (left, right) = (reader.scalar(&domain.left)?, reader.scalar(&domain.right)?);
+                Some(cas.normalize(&(left - right))?)
+            }
+            None => None,
+        };
+        let energy = cas.normalize(&energy)?;
+        Ok(Self { cas, quantities, constants: Constants::default(), strain, energy, margin })
+    }
+
+    fn derivation(mut self, law: &Law) -> Result<Derivation, DeriveError> {
+        let energy = self.energy.clone();
+        let margin = self.margin.clone();
+        let stress = self.stress()?;
+        let dgradient = vector(&mut self.quantities, "dG", GradientIncrement, 9);
+        let increment = self.stress_increment(&stress, &dgradient)?;
+        let node = vector(&mut self.quantities, "g", NodeGradient, 3);
+        let diagonal = self.diagonal(&stress, &node)?;
+        let cauchy = self.cauchy(&stress);
+
+        let with_margin = |role: Output, outputs: Vec<Expr>| {
+            let mut all = vec![(role, outputs)];
+            all.extend(margin.iter().map(|m| (Output::DomainMargin, vec![m.clone()])));
+            all
+        };
+        use Input::{DisplacementGradient as G, GradientIncrement, NodeGradient};
+        let point = vec![
+            self.lower("energy", &[G], with_margin(Output::EnergyDensity, vec![energy])),
+            self.lower("force", &[G], with_margin(Output::Stress, stress.to_vec())),
+            self.lower("dforce", &[G, GradientIncrement], vec![(Output::StressIncrement, increment)]),
+            self.lower("diagonal", &[G, NodeGradient], vec![(Output::Diagonal, diagonal)]),
+            self.lower("cauchy", &[G], vec![(Output::Cauchy, cauchy)]),
+        ];
+        let parameters: u32 = law.parameters.iter().map(|p| p.len as u32).sum();
+        let (material, names) = self.material(parameters)?;
+        let count = self.constants.expressions().len() as u32;
+        let mut kernels = vec![material.validate()?];
+        for mut kernel in point {
+            kernel.inputs.insert(0, (Input::Constants, count));
+            kernels.push(kernel.validate()?);
+        }
+        Ok(Derivation { law: law.name.clone(), hash: crate::derivation::hash(&law.text), constants: names, kernels })
+    }
+
+    fn lower(&mut self, name: &str, inputs: &[Input], outputs: Vec<(Output, Vec<Expr>)>) -> KernelIr {
+        let cas = &mut self.cas;
+        // A normalisation that the system cannot express leaves the expression as it stands: still right.
+        let normalize = |e: &Expr| cas.normalize(e).unwrap_or_else(|_| e.clone());
+        let mut lowering = Lowering::new(&self.quantities, Some(&mut self.constants), normalize);
+        let outputs = outputs
+            .into_iter()
+            .map(|(role, es)| (role, es.iter().map(|e| lowering.value(e)).collect()))
+            .collect();
+        let length = |role: Input| if role == Input::NodeGradient { 3 } else { 9 };
+        lowering.finish(name, inputs.iter().map(|&r| (r, length(r))).collect(), outputs)
+    }
+
+    /// The kernel from parameters to constants, and the constants as text.
+    fn material(&mut self, parameters: u32) -> Result<(KernelIr, Vec<String>), DeriveError> {
+        let expressions = self.constants.expressions().to_vec();
+        let names = expressions.iter().map(|e| crate::print::expression(e, &self.quantities)).collect();
+        let cas = &mut self.cas;
+        let normalize = |e: &Expr| cas.normalize(e).unwrap_or_else(|_| e.clone());
+        let mut lowering = Lowering::new(&self.quantities, None, normalize);
+        let values = expressions.iter().map(|e| lowering.value(e)).collect();
+        let kernel =
+            lowering.finish("material", vec![(Input::Parameters, parameters)], vec![(Output::Constants, values)]);
+        Ok((kernel, names))
+    }
+
+    /// P = dW/dG, collected backwards: w_k = dW/dq_k; S = dW/dE over C, N = dW/deps over eps; then P.
+    fn stress(&mut self) -> Result<[Expr; 9], DeriveError> {
+        let invariants = self.strain.invariants();
+        let mut weights = Vec::new();
+        for &(invariant, q) in &invariants {
+            let seeds = BTreeMap::from([(q, Expr::int(1))]);
+            let stop: Vec<Symbol> = invariants.iter().map(|&(_, s)| s).collect();
+            let name = format!("W_{}", self.quantities.get(q).name);
+            let mut d = Differential::new(&mut self.cas, &mut self.quantities, "W_", seeds, stop);
+            let w = d.of(&self.energy)?;
+            let w = if self.quantities.is_multiple(&w) { w } else { self.quantities.stage(name, w).into() };
+            if !w.is_zero() {
+                weights.push((invariant, q, w));
+            }
+        }
+        let mut p: [Vec<Expr>; 9] = std::array::from_fn(|_| vec![]);
+        // Tensors of strain: the derivative by a symmetric tensor, S_ab = S_ba, off-diagonal components shared by two.
+        for (base, name, scale) in [(Invariant::OF_C, "S", 2), (Invariant::OF_EPS, "N", 1)] {
+            let Some(components) = self.strain.components(base) else { continue };
+            for (k, &(a, b)) in SYMMETRIC.iter().enumerate() {
+                let mut terms = Vec::new();
+                for (invariant, q, w) in &weights {
+                    if invariant.depends_on(base) {
+                        let partial = self.partial(*q, components[k])?;
+                        terms.push(w.clone() * partial);
+                    }
+                }
+                let factor = if a == b { Expr::int(scale) } else { Expr::ratio(scale, 2) };
+                // Multiplied out, so that no number waits outside a sum to be applied wherever S is used.
+                let s = self.cas.expand(&(factor * Expr::Sum(terms)))?;
+                if s.is_zero() {
+                    continue;
+                }
+                let s = if self.quantities.is_simple(&s) {
+                    s
+                } else {
+                    self.quantities.stage(format!("{name}{a}{b}"), s).into()
+                };
+                // dW = sum over the six components, of which an off-diagonal one stands for two.
+                let back = if a == b { Expr::ratio(1, scale) } else { Expr::ratio(2, scale) };
+                for (ij, partial) in self.strain.by_gradient(&self.quantities, components[k]) {
+                    p[ij].push(back.clone() * s.clone() * partial);
+                }
+            }
+        }
+        if let Some((_, q, w)) = weights.iter().find(|(i, _, _)| *i == Invariant::J) {
+            for (ij, partial) in self.strain.by_gradient(&self.quantities, *q) {
+                p[ij].push(w.clone() * partial);
+            }
+        }
+        let mut stress: [Expr; 9] = std::array::from_fn(|_| Expr::int(0));
+        for (ij, terms) in p.into_iter().enumerate() {
+            let e = self.cas.normalize(&Expr::Sum(terms))?;
+            stress[ij] = if self.quantities.is_simple(&e) {
+                e
+            } else {
+                self.quantities.stage(format!("P{}{}", ij / 3, ij % 3), e).into()
+            };
+        }
+        Ok(stress)
+    }
+
+    /// The plain partial derivative of an invariant by one strain component.
+    fn partial(&mut self, q: Symbol, component: Symbol) -> Result<Expr, DeriveError> {
+        match &self.quantities.get(q).kind {
+            Kind::Stage { value: Value::Expr(e), .. } => Ok(self.cas.derivative(e, component)?),
+            _ => Ok(Expr::int(0)),
+        }
+    }
+
+    fn stress_increment(&mut self, stress: &[Expr; 9], dgradient: &[Symbol]) -> Result<Vec<Expr>, DeriveError> {
+        let seeds = self.strain.gradient().iter().copied().zip(dgradient.iter().map(|&s| s.into())).collect();
+        let mut d = Differential::new(&mut self.cas, &mut self.quantities, "d", seeds, vec![]);
+        stress.iter().map(|p| Ok(d.of(p)?)).collect()
+    }
+
+    /// For each displacement component i: g . dP_i. where dG = e_i (x) g.
+    fn diagonal(&mut self, stress: &[Expr; 9], node: &[Symbol]) -> Result<Vec<Expr>, DeriveError> {
+        let mut diagonal = Vec::new();
+        for i in 0..3 {
+            let gradient = self.strain.gradient();
+            let seeds: BTreeMap<Symbol, Expr> = (0..3).map(|j| (gradient[3 * i + j], node[j].into())).collect();
+            let prefix = format!("d{i}_");
+            let mut d = Differential::new(&mut self.cas, &mut self.quantities, &prefix, seeds, vec![]);
+            let mut terms = Vec::new();
+            for j in 0..3 {
+                terms.push(Expr::from(node[j]) * d.of(&stress[3 * i + j])?);
+            }
+            diagonal.push(self.cas.normalize(&Expr::Sum(terms))?);
+        }
+        Ok(diagonal)
+    }
+
+    /// sigma = P F' / J.
+    fn cauchy(&mut self, stress: &[Expr; 9]) -> Vec<Expr> {
+        let j = self.strain.jacobian(&mut self.cas, &mut self.quantities);
+        let f = self.strain.deformation().to_vec();
+        let mut sigma = Vec::new();
+        for i in 0..3 {
+            for k in 0..3 {
+                let terms =
+                    (0..3).map(|m| Expr::Product(vec![stress[3 * i + m].clone(), f[3 * k + m].into()])).collect();
+                let tau = self.quantities.stage(format!("tau{i}{k}"), Expr::Sum(terms));
+                sigma.push(Expr::from(tau) * Expr::from(j).pow(Rational::from_integer(-1)));
+            }
+        }
+        sigma
+    }
+}
+
+fn vector(quantities: &mut Quantities, name: &str, role: Input, len: u32) -> Vec<Symbol> {
+    let component = |k: u32| if len == 9 { format!("{name}{}{}", k / 3, k % 3) } else { format!("{name}{k}") };
+    (0..len).map(|k| quantities.add(component(k), Kind::Input(role, k))).collect()
+}

@@ -1,0 +1,212 @@
+//! The kinematic stages: F, C - I, eps, the cofactors and J over G, and the invariants over those.
+//!
+//! C - I is computed as G + G' + G'G (Faure et al. 2012, eq. 10, doubled), which keeps its digits at small strain, and
+//! differentiated as F'F - I, which is equal and shorter. J is computed by the first row's cofactors; the cofactors
+//! are themselves the derivatives of the determinant.
+
+use std::collections::BTreeMap;
+
+use crate::cas::{Cas, UnexpectedTerm};
+use crate::expr::{Expr, Rational, Symbol};
+use crate::ir::Input;
+use crate::quantity::{Kind, Quantities, Value};
+
+/// The six components of a symmetric tensor, in the order in which they are stored.
+pub const SYMMETRIC: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+
+/// A symmetric tensor of strain from which invariants are made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Base {
+    /// A = C - I = 2 E.
+    A,
+    /// The small strain.
+    Eps,
+}
+
+/// A scalar function of the strain from which energies are made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Invariant {
+    /// tr of a base tensor.
+    Trace(Base),
+    /// A : B of two base tensors, the lesser first.
+    Ddot(Base, Base),
+    /// det of a base tensor.
+    Det(Base),
+    /// det F.
+    J,
+}
+
+impl Invariant {
+    /// The base over which S = dW/dE is collected.
+    pub const OF_C: Base = Base::A;
+    /// The base over which dW/deps is collected.
+    pub const OF_EPS: Base = Base::Eps;
+
+    /// Whether the invariant is made from this base.
+    pub fn depends_on(self, base: Base) -> bool {
+        match self {
+            Invariant::Trace(b) | Invariant::Det(b) => b == base,
+            Invariant::Ddot(a, b) => a == base || b == base,
+            Invariant::J => false,
+        }
+    }
+}
+
+/// The kinematic stages of one derivation; a stage exists once something asks for it.
+pub struct Strain {
+    gradient: [Symbol; 9],
+    deformation: [Symbol; 9],
+    bases: BTreeMap<Base, [Symbol; 6]>,
+    jacobian: Option<Symbol>,
+    invariants: BTreeMap<Invariant, Symbol>,
+}
+
+fn name(k: usize, prefix: &str) -> String {
+    format!("{prefix}{}{}", k / 3, k % 3)
+}
+
+impl Strain {
+    /// G, and F = I + G.
+    pub fn new(quantities: &mut Quantities) -> Self {
+        let gradient: [Symbol; 9] = std::array::from_fn(|k| {
+            quantities.add(name(k, "G"), Kind::Input(Input::DisplacementGradient, k as u32))
+        });
+        // Off the diagonal F and G are the same numbers, hence the same symbols.
+        let deformation = std::array::from_fn(|k| {
+            if k % 4 == 0 {
+                quantities.stage(name(k, "F"), Expr::int(1) + gradient[k].into())
+            } else {
+                gradient[k]
+            }
+        });
+        Self { gradient, deformation, bases: BTreeMap::new(), jacobian: None, invariants: BTreeMap::new() }
+    }
+
+    /// G, row by row.
+    pub fn gradient(&self) -> &[Symbol; 9] {
+        &self.gradient
+    }
+
+    /// F, row by row.
+    pub fn deformation(&self) -> &[Symbol; 9] {
+        &self.deformation
+    }
+
+    /// The invariants in use, in a fixed order.
+    pub fn invariants(&self) -> Vec<(Invariant, Symbol)> {
+        self.invariants.iter().map(|(&i, &s)| (i, s)).collect()
+    }
+
+    /// The components of a base tensor, if in use.
+    pub fn components(&self, base: Base) -> Option<[Symbol; 6]> {
+        self.bases.get(&base).copied()
+    }
+
+    fn base(&mut self, cas: &mut Cas, quantities: &mut Quantities, base: Base) -> Result<[Symbol; 6], UnexpectedTerm> {
+        if let Some(&components) = self.bases.get(&base) {
+            return Ok(components);
+        }
+        let (g, f) = (self.gradient.map(Expr::from), self.deformation.map(Expr::from));
+        let mut components = Vec::with_capacity(6);
+        for (a, b) in SYMMETRIC {
+            let symmetric = g[3 * a + b].clone() + g[3 * b + a].clone();
+            let square = |x: &[Expr; 9]| Expr::Sum((0..3).map(|k| x[3 * k + a].clone() * x[3 * k + b].clone()).collect());
+            let (label, value, definition) = match base {
+                Base::Eps => ("eps", Expr::ratio(1, 2) * symmetric.clone(), Expr::ratio(1, 2) * symmetric),
+                Base::A => ("A", symmetric + square(&g), square(&f)),
+            };
+            let mut partials = Vec::new();
+            for s in definition.symbols() {
+                partials.push((s, cas.derivative(&definition, s)?));
+            }
+            let value = Value::Expr(cas.normalize(&value)?);
+            let symbol = quantities.add(format!("{label}{a}{b}"), Kind::Stage { value, partials: Some(partials) });
+            components.push(symbol);
+        }
+        let components: [Symbol; 6] = components.try_into().expect("six components were pushed");
+        self.bases.insert(base, components);
+        Ok(components)
+    }
+
+    /// J = det F, and with it the cofactors K = dJ/dF.
+    pub fn jacobian(&mut self, cas: &mut Cas, quantities: &mut Quantities) -> Symbol {
+        if let Some(j) = self.jacobian {
+            return j;
+        }
+        let f = self.deformation;
+        // Leibniz's formula: even permutations plus, odd ones minus.
+        let permutations = [(0, 1, 2, 1), (1, 2, 0, 1), (2, 0, 1, 1), (0, 2, 1, -1), (1, 0, 2, -1), (2, 1, 0, -1)];
+        let det = Expr::Sum(
+            permutations
+                .iter()
+                .map(|&(a, b, c, sign)| {
+                    Expr::Product(vec![Expr::int(sign), f[a].into(), f[3 + b].into(), f[6 + c].into()])
+                })
+                .collect(),
+        );
+        let cofactors: [Symbol; 9] = std::array::from_fn(|k| {
+            let e = cas.derivative(&det, f[k]).expect("the derivative of a polynomial is a polynomial");
+            quantities.stage(name(k, "K"), e)
+        });
+        let value = Expr::Sum((0..3).map(|k| Expr::from(f[k]) * cofactors[k].into()).collect());
+        let partials = f.iter().zip(cofactors).map(|(&s, k)| (s, k.into())).collect();
+        let j = quantities.add("J", Kind::Stage { value: Value::Expr(value), partials: Some(partials) });
+        self.jacobian = Some(j);
+        j
+    }
+
+    /// The symbol of an invariant, made on first use.
+    pub fn invariant(
+        &mut self,
+        cas: &mut Cas,
+        quantities: &mut Quantities,
+        invariant: Invariant,
+    ) -> Result<Symbol, UnexpectedTerm> {
+        if let Some(&s) = self.invariants.get(&invariant) {
+            return Ok(s);
+        }
+        let label = |b: Base| if b == Base::A { "A" } else { "eps" };
+        let symbol = match invariant {
+            Invariant::J => self.jacobian(cas, quantities),
+            Invariant::Trace(b) => {
+                let c = self.base(cas, quantities, b)?;
+                quantities.stage(format!("tr{}", label(b)), Expr::Sum(c[..3].iter().map(|&s| s.into()).collect()))
+            }
+            Invariant::Ddot(x, y) => {
+                let (a, b) = (self.base(cas, quantities, x)?, self.base(cas, quantities, y)?);
+                let term = |k: usize| {
+                    let twice = if SYMMETRIC[k].0 == SYMMETRIC[k].1 { 1 } else { 2 };
+                    Expr::Product(vec![Expr::int(twice), a[k].into(), b[k].into()])
+                };
+                let e = cas.normalize(&Expr::Sum((0..6).map(term).collect()))?;
+                quantities.stage(format!("{}_{}", label(x), label(y)), e)
+            }
+            Invariant::Det(b) => {
+                let c = self.base(cas, quantities, b)?.map(Expr::from);
+                let [xx, yy, zz, xy, xz, yz] = c;
+                let two = Rational::from_integer(2);
+                let e = xx.clone() * yy.clone() * zz.clone()
+                    + Expr::int(2) * (xy.clone() * xz.clone() * yz.clone())
+                    - xx * yz.pow(two)
+                    - yy * xz.pow(two)
+                    - zz * xy.pow(two);
+                let e = cas.normalize(&e)?;
+                quantities.stage(format!("det{}", label(b)), e)
+            }
+        };
+        self.invariants.insert(invariant, symbol);
+        Ok(symbol)
+    }
+
+    /// The derivatives of a strain component or of J by the components of G, as (3 i + j, derivative).
+    pub fn by_gradient(&self, quantities: &Quantities, s: Symbol) -> Vec<(usize, Expr)> {
+        // Where F and G differ, on the diagonal, dF = dG.
+        let index = |x: Symbol| self.deformation.iter().chain(&self.gradient).position(|&y| y == x).map(|k| k % 9);
+        match &quantities.get(s).kind {
+            Kind::Stage { partials: Some(partials), .. } => {
+                partials.iter().filter_map(|(by, e)| index(*by).map(|ij| (ij, e.clone()))).collect()
+            }
+            _ => vec![],
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! Elements: declared by interpolation functions and a quadrature rule, printed as kernels that know no law.
+//!
+//! An element is data ([`ElementDeclaration`]). Its kernels gather G = sum_j u_j (x) grad Lambda_j from nodal
+//! displacements and contract a stress with the gradients, f_j = -w P grad Lambda_j. Because the functions sum to one,
+//! sum_j grad Lambda_j = 0: the gather subtracts the first node's displacement before it multiplies, which keeps the
+//! digits of a small strain in a large translation.
+
+use num_traits::{One, Zero};
+
+use crate::ir::{Builder, Input, InvalidKernel, KernelIr, Output, Rational, ValidKernel, ValueId};
+
+/// A polynomial in the reference coordinates: coefficient and exponents of each term.
+pub type Polynomial = Vec<(Rational, [u32; 3])>;
+
+/// An element, as data.
+#[derive(Debug, Clone)]
+pub struct ElementDeclaration {
+    /// Its name, a snake_case identifier.
+    pub name: &'static str,
+    /// What it is, for the reader.
+    pub docs: &'static str,
+    /// Interpolation functions Lambda_j, one a node.
+    pub functions: Vec<Polynomial>,
+    /// Quadrature points (reference coordinates) and weights; the weights sum to the reference volume.
+    pub quadrature: Vec<([Rational; 3], Rational)>,
+}
+
+/// Why an element's declaration is refused.
+#[derive(Debug, thiserror::Error)]
+pub enum ElementError {
+    /// The functions do not sum to one.
+    #[error("element `{0}`: its interpolation functions do not sum to 1")]
+    Unity(&'static str),
+    /// The gradients are not constant, or there are several quadrature points.
+    #[error("element `{0}`: only elements with constant gradients and one quadrature point are supported by this version")]
+    NotConstant(&'static str),
+    /// A printed kernel breaks a rule: a defect of the generator.
+    #[error(transparent)]
+    Invalid(#[from] InvalidKernel),
+}
+
+/// The kernels of an element.
+#[derive(Debug, Clone)]
+pub struct ElementKernels {
+    /// The element's name.
+    pub name: &'static str,
+    /// What it is.
+    pub docs: &'static str,
+    /// Number of nodes.
+    pub nodes: u32,
+    /// Nodal displacements and shape gradients -> G.
+    pub gradient: ValidKernel,
+    /// Stress, shape gradients and weight -> nodal forces.
+    pub contract: ValidKernel,
+    /// Shape gradients -> the gradients of all nodes.
+    pub node_gradients: ValidKernel,
+    /// Gradients of Lambda_j by the reference coordinates, one row a node.
+    pub reference_gradients: Vec<[Rational; 3]>,
+}
+
+/// The linear tetrahedron: Lambda_0 = 1 - x - y - z, Lambda_1 = x, Lambda_2 = y, Lambda_3 = z; one quadrature point.
+pub fn tetrahedron_p1() -> ElementDeclaration {
+    let one = Rational::one();
+    let axis = |k: usize| {
+        let mut e = [0; 3];
+        e[k] = 1;
+        e
+    };
+    let quarter = Rational::new(1, 4);
+    ElementDeclaration {
+        name: "tetrahedron_p1",
+        docs: "The linear tetrahedron: constant gradients, one quadrature point (Faure et al. 2012, eqs. 2 to 6).",
+        functions: vec![
+            vec![(one, [0; 3]), (-one, axis(0)), (-one, axis(1)), (-one, axis(2))],
+            vec![(one, axis(0))],
+            vec![(one, axis(1))],
+            vec![(one, axis(2))],
+        ],
+        quadrature: vec![([quarter; 3], Rational::new(1, 6))],
+    }
+}
+
+fn derivative(p: &Polynomial, k: usize) -> Polynomial {
+    let mut terms = Vec::new();
+    for (c, e) in p {
+        if e[k] > 0 {
+            let mut lower = *e;
+            lower[k] -= 1;
+            terms.push((*c * Rational::from_integer(e[k].into()), lower));
+        }
+    }
+    terms
+}
+
+fn constant(p: &Polynomial) -> Option<Rational> {
+    p.iter().all(|(_, e)| *e == [0; 3]).then(|| p.iter().map(|(c, _)| *c).sum())
+}
+
+fn sums_to_one(functions: &[Polynomial]) -> bool {
+    let mut total = std::collections::BTreeMap::new();
+    for (c, e) in functions.iter().flatten() {
+        *total.entry(*e).or_insert_with(Rational::zero) += *c;
+    }
+    total.iter().all(|(e, c)| if *e == [0; 3] { c.is_one() } else { c.is_zero() })
+}
+
+/// Generates the kernels of an element.
+///
+/// # Errors
+/// See [`ElementError`].
+pub fn kernels(element: &ElementDeclaration) -> Result<ElementKernels, ElementError> {
+    if !sums_to_one(&element.functions) {
+        return Err(ElementError::Unity(element.name));
+    }
+    if element.quadrature.len() != 1 {
+        return Err(ElementError::NotConstant(element.name));
+    }
+    let mut reference_gradients = Vec::new();
+    for f in &element.functions {
+        let mut row = [Rational::zero(); 3];
+        for (k, entry) in row.iter_mut().enumerate() {
+            *entry = constant(&derivative(f, k)).ok_or(ElementError::NotConstant(element.name))?;
+        }
+        reference_gradients.push(row);
+    }
+    let n = element.functions.len() as u32;
+    Ok(ElementKernels {
+        name: element.name,
+        docs: element.docs,
+        nodes: n,
+        gradient: gradient(n).validate()?,
+        contract: contract(n).validate()?,
+        node_gradients: node_gradients(n).validate()?,
+        reference_gradients,
+    })
+}
+
+/// Component k of the gradient of node j >= 1.
+fn shape(b: &mut Builder, j: u32, k: u32) -> ValueId {
+    b.input(Input::ShapeGradients, 3 * (j - 1) + k)
+}
+
+fn gradient(n: u32) -> KernelIr {
+    let mut b = Builder::new();
+    let mut g = Vec::new();
+    for i in 0..3 {
+        let first = b.input(Input::NodalDisplacement, i);
+        let relative: Vec<ValueId> = (1..n)
+            .map(|j| {
+                let u = b.input(Input::NodalDisplacement, 3 * j + i);
+                b.sub(u, first)
+            })
+            .collect();
+        for k in 0..3 {
+            let mut sum = None;
+            for (j, &u) in relative.iter().enumerate() {
+                let s = shape(&mut b, j as u32 + 1, k);
+                let term = b.mul(u, s);
+                sum = Some(sum.map_or(term, |t| b.add(t, term)));
+            }
+            g.push(sum.expect("an element has more than one node"));
+        }
+    }
+    let inputs = vec![(Input::NodalDisplacement, 3 * n), (Input::ShapeGradients, 3 * (n - 1))];
+    b.finish("gradient", inputs, vec![(Output::DisplacementGradient, g)])
+}
+
+fn contract(n: u32) -> KernelIr {
+    let mut b = Builder::new();
+    let weight = b.input(Input::Weight, 0);
+    let minus = b.neg(weight);
+    let p: Vec<ValueId> = (0..9)
+        .map(|k| {
+            let p = b.input(Input::StressIn, k);
+            b.mul(minus, p)
+        })
+        .collect();
+    let mut forces = vec![];
+    for j in 1..n {
+        for i in 0..3 {
+            let mut sum = None;
+            for k in 0..3 {
+                let s = shape(&mut b, j, k as u32);
+                let term = b.mul(p[3 * i + k], s);
+                sum = Some(sum.map_or(term, |t| b.add(t, term)));
+            }
+            forces.push(sum.expect("three terms"));
+        }
+    }
+    // The forces of an element sum to zero: the first node's is minus the others'.
+    let first: Vec<ValueId> = (0..3)
+        .map(|i| {
+            let mut sum = forces[i];
+            for j in 1..(n as usize - 1) {
+                sum = b.add(sum, forces[3 * j + i]);
+            }
+            b.neg(sum)
+        })
+        .collect();
+    let inputs = vec![(Input::StressIn, 9), (Input::ShapeGradients, 3 * (n - 1)), (Input::Weight, 1)];
+    b.finish("contract", inputs, vec![(Output::NodalForce, first.into_iter().chain(forces).collect())])
+}
+
+fn node_gradients(n: u32) -> KernelIr {
+    let mut b = Builder::new();
+    let others: Vec<ValueId> = (1..n).flat_map(|j| (0..3).map(move |k| (j, k))).map(|(j, k)| shape(&mut b, j, k)).collect();
+    let first: Vec<ValueId> = (0..3)
+        .map(|k| {
+            let mut sum = others[k];
+            for j in 1..(n as usize - 1) {
+                sum = b.add(sum, others[3 * j + k]);
+            }
+            b.neg(sum)
+        })
+        .collect();
+    let inputs = vec![(Input::ShapeGradients, 3 * (n - 1))];
+    b.finish("node_gradients", inputs, vec![(Output::NodeGradients, first.into_iter().chain(others).collect())])
+}

@@ -1,0 +1,172 @@
+//! What generated laws implement, and how a runtime meets them without knowing their types.
+
+use crate::batch;
+use crate::real::Real;
+
+/// A constitutive law: point kernels generated from its strain energy density W.
+///
+/// G = grad u (9 components, row by row: component 3 i + j is du_i/dX_j), F = I + G. `constants` are the law's
+/// [`Law::material`] constants. Stresses and energies have the unit of the stress parameters.
+pub trait Law: Send + Sync + 'static {
+    /// What the law is.
+    fn info() -> &'static LawInfo;
+    /// The constants of a material from its parameters (all components in order), on the host in f64.
+    ///
+    /// # Panics
+    /// If the slices have not the lengths that [`LawInfo`] gives.
+    fn material(parameters: &[f64], constants: &mut [f64]);
+    /// W, and the domain's margin (positive inside).
+    fn energy<R: Real>(constants: &[R], displacement_gradient: &[R; 9]) -> (R, R);
+    /// P = dW/dG, the first Piola-Kirchhoff stress, and the domain's margin.
+    fn force<R: Real>(constants: &[R], displacement_gradient: &[R; 9]) -> ([R; 9], R);
+    /// dP, the differential of P at G in the direction dG.
+    fn dforce<R: Real>(constants: &[R], displacement_gradient: &[R; 9], gradient_increment: &[R; 9]) -> [R; 9];
+    /// g . (d2W / dG_i. dG_i.) . g for i = 0, 1, 2, where g is the gradient of one node's interpolation function.
+    fn diagonal<R: Real>(constants: &[R], displacement_gradient: &[R; 9], node_gradient: &[R; 3]) -> [R; 3];
+    /// The Cauchy stress P F' / J.
+    fn cauchy<R: Real>(constants: &[R], displacement_gradient: &[R; 9]) -> [R; 9];
+}
+
+/// A parameter of a law.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParameterInfo {
+    /// Its name.
+    pub name: &'static str,
+    /// What it is.
+    pub docs: &'static str,
+    /// Its unit, as the law file gives it.
+    pub unit: &'static str,
+    /// The unit's exponents of length, stress and time.
+    pub dimensions: [i32; 3],
+    /// The least and greatest value allowed.
+    pub range: (f64, f64),
+    /// The value where a scene gives none, one entry a component.
+    pub default: Option<&'static [f64]>,
+    /// Whether a scene may give one value an element.
+    pub per_element: bool,
+    /// Components: 1, or the array's length.
+    pub len: usize,
+}
+
+/// What the generator found out about a law.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Structure {
+    /// dP does not depend on G.
+    pub linear: bool,
+    /// The stress needs J or the cofactors of F.
+    pub uses_j: bool,
+    /// Force and force differential are polynomials in G.
+    pub polynomial: bool,
+}
+
+/// Operations of one evaluation of a point kernel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Operations {
+    /// The kernel's name.
+    pub kernel: &'static str,
+    /// Additions and subtractions.
+    pub additions: u32,
+    /// Multiplications.
+    pub multiplications: u32,
+    /// Divisions.
+    pub divisions: u32,
+    /// Square roots, logarithms, exponentials, powers.
+    pub functions: u32,
+    /// Selections.
+    pub selects: u32,
+}
+
+impl Operations {
+    /// Additions, multiplications and divisions.
+    pub fn arithmetic(&self) -> u32 {
+        self.additions + self.multiplications + self.divisions
+    }
+}
+
+/// A law's metadata.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LawInfo {
+    /// Name in scenes.
+    pub name: &'static str,
+    /// What it is, and its source.
+    pub docs: &'static str,
+    /// Its parameters, in order.
+    pub parameters: &'static [ParameterInfo],
+    /// The inequality that holds inside the law's domain; `None` is everywhere.
+    pub domain: Option<&'static str>,
+    /// The material's constants as expressions in the parameters, for the reader.
+    pub constants: &'static [&'static str],
+    /// Detected structure.
+    pub structure: Structure,
+    /// Operations of each point kernel.
+    pub operations: &'static [Operations],
+    /// Identifies the law file's text.
+    pub hash: u64,
+    /// Whether the committed derivation exists and is the one for this text.
+    pub reviewed: bool,
+}
+
+impl LawInfo {
+    /// Components of all parameters together.
+    pub fn parameter_components(&self) -> usize {
+        self.parameters.iter().map(|p| p.len).sum()
+    }
+}
+
+/// A law's batched kernels on linear tetrahedra in one precision; see [`crate::batch`].
+#[derive(Debug, Clone, Copy)]
+pub struct BatchKernels<R: Real> {
+    /// Strain energy of each element.
+    pub energy: batch::EnergyKernel<R>,
+    /// Nodal forces of each element.
+    pub force: batch::ForceKernel<R>,
+    /// Nodal force differentials of each element.
+    pub dforce: batch::DForceKernel<R>,
+    /// Diagonal of the tangent stiffness at each element's nodes.
+    pub diagonal: batch::ForceKernel<R>,
+    /// Cauchy stress of each element.
+    pub cauchy: batch::CauchyKernel<R>,
+}
+
+impl<R: Real> BatchKernels<R> {
+    /// The kernels of a law.
+    pub fn of<L: Law>() -> Self {
+        Self {
+            energy: batch::energy::<L, R>,
+            force: batch::force::<L, R>,
+            dforce: batch::dforce::<L, R>,
+            diagonal: batch::diagonal::<L, R>,
+            cauchy: batch::cauchy::<L, R>,
+        }
+    }
+}
+
+/// A law of this build: metadata and entry points. Laws are data: nothing else names them.
+#[derive(Debug, Clone, Copy)]
+pub struct LawEntry {
+    /// What the law is.
+    pub info: &'static LawInfo,
+    /// [`Law::material`].
+    pub material: fn(&[f64], &mut [f64]),
+    /// Batched kernels in single precision.
+    pub f32: fn() -> BatchKernels<f32>,
+    /// Batched kernels in double precision.
+    pub f64: fn() -> BatchKernels<f64>,
+}
+
+impl LawEntry {
+    /// The entry of a law.
+    pub const fn new<L: Law>(info: &'static LawInfo) -> Self {
+        Self { info, material: L::material, f32: BatchKernels::<f32>::of::<L>, f64: BatchKernels::<f64>::of::<L> }
+    }
+
+    /// The constants of a material, checked for length only.
+    ///
+    /// # Panics
+    /// If `parameters` has not one value a component.
+    pub fn constants(&self, parameters: &[f64]) -> Vec<f64> {
+        let mut constants = vec![0.0; self.info.constants.len()];
+        (self.material)(parameters, &mut constants);
+        constants
+    }
+}

@@ -1,0 +1,96 @@
+//! The number types that kernels run on.
+
+use std::fmt::Debug;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// A real number, or several side by side, as generated kernels use it.
+///
+/// Generated code calls nothing else, so that a type of lanes or of dual numbers can stand in for `f32` and `f64`.
+pub trait Real:
+    Copy
+    + Debug
+    + Send
+    + Sync
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// The nearest value to a constant.
+    fn from_f64(x: f64) -> Self;
+    /// The value as `f64`; the first lane of several.
+    fn to_f64(self) -> f64;
+    /// a b + c, rounded once.
+    fn mul_add(self, b: Self, c: Self) -> Self;
+    /// Square root.
+    fn sqrt(self) -> Self;
+    /// Natural logarithm.
+    fn ln(self) -> Self;
+    /// Exponential.
+    fn exp(self) -> Self;
+    /// ln(1 + x), accurate for small x.
+    fn ln_1p(self) -> Self;
+    /// exp(x) - 1, accurate for small x.
+    fn exp_m1(self) -> Self;
+    /// x to the power y, for x > 0.
+    fn powf(self, y: Self) -> Self;
+    /// `then` where left > right, `otherwise` elsewhere, lane by lane.
+    fn select_greater(left: Self, right: Self, then: Self, otherwise: Self) -> Self;
+    /// Whether every lane is > 0. NaN is not.
+    fn is_positive(self) -> bool;
+}
+
+macro_rules! float {
+    ($t:ty) => {
+        impl Real for $t {
+            #[inline(always)]
+            fn from_f64(x: f64) -> Self {
+                x as $t
+            }
+            #[inline(always)]
+            fn to_f64(self) -> f64 {
+                f64::from(self)
+            }
+            #[inline(always)]
+            fn mul_add(self, b: Self, c: Self) -> Self {
+                <$t>::mul_add(self, b, c)
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                <$t>::sqrt(self)
+            }
+            #[inline(always)]
+            fn ln(self) -> Self {
+                <$t>::ln(self)
+            }
+            #[inline(always)]
+            fn exp(self) -> Self {
+                <$t>::exp(self)
+            }
+            #[inline(always)]
+            fn ln_1p(self) -> Self {
+                <$t>::ln_1p(self)
+            }
+            #[inline(always)]
+            fn exp_m1(self) -> Self {
+                <$t>::exp_m1(self)
+            }
+            #[inline(always)]
+            fn powf(self, y: Self) -> Self {
+                <$t>::powf(self, y)
+            }
+            #[inline(always)]
+            fn select_greater(left: Self, right: Self, then: Self, otherwise: Self) -> Self {
+                if left > right { then } else { otherwise }
+            }
+            #[inline(always)]
+            fn is_positive(self) -> bool {
+                self > 0.0
+            }
+        }
+    };
+}
+float!(f32);
+float!(f64);
