@@ -1,0 +1,31 @@
+//! The CPU backend: vectors in memory, sums in fixed blocks, elements on all cores.
+
+mod field;
+mod vectors;
+
+pub use field::CpuField;
+pub use vectors::CpuBackend;
+
+use tensormass_kernels::{BatchKernels, LawEntry, Real};
+
+/// A precision of the CPU backend.
+pub trait Precision: Real + Default + std::iter::Sum {
+    /// Unit round-off.
+    const EPSILON: f64;
+    /// The law's kernels in this precision.
+    fn kernels(law: &LawEntry) -> BatchKernels<Self>;
+}
+
+impl Precision for f32 {
+    const EPSILON: f64 = f32::EPSILON as f64 / 2.0;
+    fn kernels(law: &LawEntry) -> BatchKernels<Self> {
+        (law.f32)()
+    }
+}
+
+impl Precision for f64 {
+    const EPSILON: f64 = f64::EPSILON / 2.0;
+    fn kernels(law: &LawEntry) -> BatchKernels<Self> {
+        (law.f64)()
+    }
+}

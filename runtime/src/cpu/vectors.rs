@@ -1,0 +1,141 @@
+//! Vector arithmetic on the CPU: parallel over fixed blocks of nodes, so that sums do not depend on the thread count.
+
+use rayon::prelude::*;
+
+use super::Precision;
+use crate::backend::Backend;
+
+/// Nodes a block: a block's partial sum is formed by one thread, blocks are added in order.
+const BLOCK: usize = 4096;
+
+/// Vectors in memory.
+#[derive(Debug)]
+pub struct CpuBackend<R> {
+    nodes: usize,
+    /// (node, component) of each constrained component, ascending.
+    constrained: Vec<(u32, u8)>,
+    precision: std::marker::PhantomData<R>,
+}
+
+impl<R: Precision> CpuBackend<R> {
+    /// A backend for a body of `nodes` nodes whose `constrained` components (node, component) are imposed.
+    pub fn new(nodes: usize, constrained: Vec<(u32, u8)>) -> Self {
+        Self { nodes, constrained, precision: std::marker::PhantomData }
+    }
+
+    fn each(&self, x: &[[R; 3]], y: &mut [[R; 3]], f: impl Fn(&[R; 3], &mut [R; 3]) + Sync) {
+        y.par_chunks_mut(BLOCK).zip(x.par_chunks(BLOCK)).for_each(|(y, x)| {
+            for (y, x) in y.iter_mut().zip(x) {
+                f(x, y);
+            }
+        });
+    }
+
+    fn sum(x: &[[R; 3]], y: &[[R; 3]], f: impl Fn(&[R; 3], &[R; 3]) -> f64 + Sync) -> f64 {
+        let blocks: Vec<f64> = x
+            .par_chunks(BLOCK)
+            .zip(y.par_chunks(BLOCK))
+            .map(|(x, y)| x.iter().zip(y).map(|(x, y)| f(x, y)).sum::<f64>())
+            .collect();
+        blocks.iter().sum()
+    }
+}
+
+impl<R: Precision> Backend for CpuBackend<R> {
+    type Vector = Vec<[R; 3]>;
+
+    fn zeros(&self) -> Self::Vector {
+        vec![[R::default(); 3]; self.nodes]
+    }
+
+    fn upload(&self, values: &[[f64; 3]]) -> Self::Vector {
+        values.iter().map(|v| v.map(R::from_f64)).collect()
+    }
+
+    fn download(&self, x: &Self::Vector) -> Vec<[f64; 3]> {
+        x.iter().map(|v| v.map(R::to_f64)).collect()
+    }
+
+    fn copy(&self, x: &Self::Vector, y: &mut Self::Vector) {
+        y.copy_from_slice(x);
+    }
+
+    fn clear(&self, x: &mut Self::Vector) {
+        x.fill([R::default(); 3]);
+    }
+
+    fn axpy(&self, a: f64, x: &Self::Vector, y: &mut Self::Vector) {
+        let a = R::from_f64(a);
+        self.each(x, y, |x, y| {
+            for c in 0..3 {
+                y[c] = y[c] + a * x[c];
+            }
+        });
+    }
+
+    fn xpby(&self, x: &Self::Vector, b: f64, y: &mut Self::Vector) {
+        let b = R::from_f64(b);
+        self.each(x, y, |x, y| {
+            for c in 0..3 {
+                y[c] = x[c] + b * y[c];
+            }
+        });
+    }
+
+    fn scale(&self, b: f64, y: &mut Self::Vector) {
+        let b = R::from_f64(b);
+        y.par_chunks_mut(BLOCK).for_each(|y| y.iter_mut().for_each(|y| *y = y.map(|y| b * y)));
+    }
+
+    fn multiply_add(&self, a: f64, d: &Self::Vector, x: &Self::Vector, y: &mut Self::Vector) {
+        let a = R::from_f64(a);
+        y.par_chunks_mut(BLOCK).zip(x.par_chunks(BLOCK)).zip(d.par_chunks(BLOCK)).for_each(|((y, x), d)| {
+            for ((y, x), d) in y.iter_mut().zip(x).zip(d) {
+                for c in 0..3 {
+                    y[c] = y[c] + a * (d[c] * x[c]);
+                }
+            }
+        });
+    }
+
+    fn divide(&self, x: &Self::Vector, d: &Self::Vector, y: &mut Self::Vector) {
+        y.par_chunks_mut(BLOCK).zip(x.par_chunks(BLOCK)).zip(d.par_chunks(BLOCK)).for_each(|((y, x), d)| {
+            for ((y, x), d) in y.iter_mut().zip(x).zip(d) {
+                for c in 0..3 {
+                    y[c] = x[c] / d[c];
+                }
+            }
+        });
+    }
+
+    fn dot(&self, x: &Self::Vector, y: &Self::Vector) -> f64 {
+        // The products of two f32 are exact in f64: a dot product's rounding does not limit a solver in f32.
+        Self::sum(x, y, |x, y| (0..3).map(|c| x[c].to_f64() * y[c].to_f64()).sum())
+    }
+
+    fn max_abs(&self, x: &Self::Vector) -> f64 {
+        let block = |x: &[[R; 3]]| {
+            x.iter().flatten().fold(0.0_f64, |m, v| {
+                let v = v.to_f64().abs();
+                if v.is_finite() { m.max(v) } else { f64::INFINITY }
+            })
+        };
+        x.par_chunks(BLOCK).map(block).reduce(|| 0.0, f64::max)
+    }
+
+    fn project(&self, x: &mut Self::Vector) {
+        for &(node, c) in &self.constrained {
+            x[node as usize][c as usize] = R::default();
+        }
+    }
+
+    fn impose(&self, values: &[f64], x: &mut Self::Vector) {
+        for (&(node, c), &value) in self.constrained.iter().zip(values) {
+            x[node as usize][c as usize] = R::from_f64(value);
+        }
+    }
+
+    fn epsilon(&self) -> f64 {
+        R::EPSILON
+    }
+}
