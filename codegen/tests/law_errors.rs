@@ -176,7 +176,7 @@ fn mutated_laws_never_panic() {
 #[test]
 fn deep_and_long_texts_never_exhaust_the_stack() {
     let mut bodies: Vec<String> = Vec::new();
-    for n in [10, 60, 250, 500, 5_000] {
+    for n in [10, 60, 250, 399, 500, 5_000] {
         let repeated = |text: &str| text.repeat(n);
         bodies.push(format!("{}s.J{} * p.mu", repeated("("), repeated(")")));
         bodies.push(format!("{}s.J{} * p.mu", repeated("exp("), repeated(")")));
@@ -216,4 +216,12 @@ fn deep_and_long_texts_never_exhaust_the_stack() {
     let helpers = (1..60).map(|i| format!("fn f{i}(x: f64) -> f64 {{ f{}(x) + f{}(x) }}\n", i - 1, i - 1));
     let helpers: String = std::iter::once(String::from("fn f0(x: f64) -> f64 { x }\n")).chain(helpers).collect();
     check_places(&format!("{DOCS}{STRUCT}{helpers}{SIGNATURE}f59(s.J) * p.mu\n}}\n"));
+    // Calls and brackets together.
+    let nested =
+        |i: usize| format!("fn f{}(x: f64) -> f64 {{ {}f{i}(x){} }}\n", i + 1, "exp(".repeat(20), ")".repeat(20));
+    let helpers: String = (0..20).map(nested).collect();
+    for last in 0..20 {
+        let energy = format!("{SIGNATURE}f{last}(s.J) * p.mu\n}}\n");
+        check_places(&format!("{DOCS}{STRUCT}fn f0(x: f64) -> f64 {{ x }}\n{helpers}{energy}"));
+    }
 }

@@ -227,3 +227,12 @@ fn the_shipped_laws() {
         assert!(found.iter().any(|law| law == expected), "{expected:?} is not in {found:#?}");
     }
 }
+
+#[test]
+fn the_reference_shows_a_shipped_law() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../laws");
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect("laws/ is in the repository");
+    let reference = read("README.md");
+    let example = reference.split("```rust\n").nth(1).and_then(|rest| rest.split("```").next());
+    assert_eq!(example, Some(read("neo_hookean.rs").as_str()));
+}
