@@ -1,3 +1,20 @@
 //! Law files: text in, checked energy out.
 
+mod arithmetic;
 pub mod ast;
+mod brackets;
+mod calls;
+mod error;
+mod expr;
+mod functions;
+mod limits;
+mod literals;
+mod metadata;
+mod parse;
+mod units;
+mod uses;
+mod value;
+mod words;
+
+pub use error::LawError;
+pub use parse::parse;

@@ -1,0 +1,238 @@
+//! Good law files: what the parser makes of them. The tree is compared as a formula, so that a failure can be read.
+
+use std::path::Path;
+
+use tensormass_codegen::law::ast::{Law, Scalar, ScalarNode, Tensor, TensorNode};
+
+/// The tree as a formula; `name := (value)` where a `let` named it.
+fn scalar(law: &Law, node: &Scalar) -> String {
+    let s = |node: &Scalar| scalar(law, node);
+    let t = |node: &Tensor| tensor(law, node);
+    match &**node {
+        ScalarNode::Number(value) => value.to_string(),
+        ScalarNode::Parameter { parameter, component } => {
+            let parameter = &law.parameters[*parameter];
+            if parameter.len > 1 { format!("{}[{component}]", parameter.name) } else { parameter.name.clone() }
+        }
+        ScalarNode::Invariant(invariant) => format!("{invariant:?}"),
+        ScalarNode::Trace(a) => format!("tr({})", t(a)),
+        ScalarNode::Det(a) => format!("det({})", t(a)),
+        ScalarNode::Ddot(a, b) => format!("ddot({}, {})", t(a), t(b)),
+        ScalarNode::Add(a, b) => format!("({} + {})", s(a), s(b)),
+        ScalarNode::Sub(a, b) => format!("({} - {})", s(a), s(b)),
+        ScalarNode::Mul(a, b) => format!("({} * {})", s(a), s(b)),
+        ScalarNode::Div(a, b) => format!("({} / {})", s(a), s(b)),
+        ScalarNode::Neg(a) => format!("-{}", s(a)),
+        ScalarNode::Powi(a, n) => format!("{}^{n}", s(a)),
+        ScalarNode::Powf(a, b) => format!("{}^{}", s(a), s(b)),
+        ScalarNode::Ln(a) => format!("ln({})", s(a)),
+        ScalarNode::Exp(a) => format!("exp({})", s(a)),
+        ScalarNode::Sqrt(a) => format!("sqrt({})", s(a)),
+        ScalarNode::Select { left, right, then, otherwise } => {
+            format!("[{} > {} ? {} : {}]", s(left), s(right), s(then), s(otherwise))
+        }
+        ScalarNode::Named(name, value) => format!("{name}:={}", s(value)),
+    }
+}
+
+fn tensor(law: &Law, node: &Tensor) -> String {
+    let t = |node: &Tensor| tensor(law, node);
+    match &**node {
+        TensorNode::Eps => String::from("eps"),
+        TensorNode::E => String::from("E"),
+        TensorNode::C => String::from("C"),
+        TensorNode::Identity => String::from("1"),
+        TensorNode::Add(a, b) => format!("({} + {})", t(a), t(b)),
+        TensorNode::Sub(a, b) => format!("({} - {})", t(a), t(b)),
+        TensorNode::Scale(s, a) => format!("{}{}", scalar(law, s), t(a)),
+    }
+}
+
+fn parse(path: &str, text: &str) -> Law {
+    tensormass_codegen::law::parse(path, text).unwrap_or_else(|errors| {
+        let errors: Vec<String> = errors.iter().map(ToString::to_string).collect();
+        panic!("{}\n\nin\n{text}", errors.join("\n"))
+    })
+}
+
+/// A file with parameters mu and K, an array c, and the given functions; W has to be `expected`.
+fn check(functions: &str, expected: &str) {
+    let mut fields = String::new();
+    for (name, ty) in [("mu", "f64"), ("K", "f64"), ("c", "[f64; 3]")] {
+        if functions.contains(&format!("p.{name}")) || functions.contains(&format!("q.{name}")) {
+            fields.push_str(&format!("/// A modulus.\n#[unit(\"Pa\")] #[range(0.0, 1e9)] {name}: {ty},\n"));
+        }
+    }
+    let law = parse("laws/test.rs", &format!("//! Test.\nstruct Parameters {{\n{fields}}}\n{functions}"));
+    assert_eq!(scalar(&law, &law.energy), expected, "{functions}");
+}
+
+/// The same, for one expression.
+fn check_expression(expression: &str, expected: &str) {
+    check(&format!("fn energy_density(s: Strain, p: Parameters) -> f64 {{ {expression} }}"), expected);
+}
+
+#[test]
+fn arithmetic_is_kept_as_written() {
+    check_expression("p.mu * s.I1 - 3.0 * p.mu", "((mu * I1) - (3 * mu))");
+    check_expression("p.mu - s.J - 1.0", "((mu - J) - 1)");
+    check_expression("-p.mu * -s.J", "(-mu * -J)");
+    check_expression("p.mu / 2.0 * (s.I1bar - 3.0)", "((mu / 2) * (I1bar - 3))");
+    check_expression(
+        "0.3 * p.mu * s.I2bar * 1e-3 * s.I3 * s.I2 * 2.5e1",
+        "((((((3/10 * mu) * I2bar) * 1/1000) * I3) * I2) * 25)",
+    );
+    check_expression("let a = p.mu / 2.0; let b: f64 = a * s.J; b + a", "(b:=(a:=(mu / 2) * J) + a:=(mu / 2))");
+}
+
+#[test]
+fn tensors_and_their_functions() {
+    check_expression("p.mu * tr(s.E).powi(2)", "(mu * tr(E)^2)");
+    check_expression("p.mu * ddot(s.eps, s.C) + det(s.C)", "((mu * ddot(eps, C)) + det(C))");
+    check_expression(
+        "let dev = s.E - tr(s.E) / 3.0 * identity(); p.mu * ddot(dev, dev)",
+        "(mu * ddot((E - (tr(E) / 3)1), (E - (tr(E) / 3)1)))",
+    );
+    check_expression("tr(s.C * p.mu + s.E / 2.0 - -s.C)", "tr(((muC + (1 / 2)E) - -1C))");
+}
+
+#[test]
+fn functions_and_methods() {
+    check_expression("p.mu * ln(s.J) + s.J.ln()", "((mu * ln(J)) + ln(J))");
+    check_expression("p.mu * exp(s.J).sqrt() + sqrt(s.J).exp()", "((mu * sqrt(exp(J))) + exp(sqrt(J)))");
+    check_expression("powi(s.J, -2) * powf(s.I3, p.mu)", "(J^-2 * I3^mu)");
+    check_expression("s.J.powf(-2.0 / 3.0) * p.mu", "(J^(-2 / 3) * mu)");
+    check_expression("p.mu * pos(s.J - 1.0)", "(mu * [(J - 1) > 0 ? (J - 1) : 0])");
+    check_expression("select(s.J > 1.0, p.mu, 2.0)", "[J > 1 ? mu : 2]");
+    check_expression("select(s.J < 1.0, p.mu, 2.0)", "[1 > J ? mu : 2]");
+    check_expression("select(s.J >= 1.0, p.mu, 2.0)", "[1 > J ? 2 : mu]");
+    check_expression("select((s.J <= 1.0), p.mu, 2.0)", "[J > 1 ? 2 : mu]");
+    check_expression("s.J * shear_modulus(p.mu, p.K)", "(J * (mu / (2 * (1 + K))))");
+    check_expression("s.J * lame_lambda(p.mu, p.K)", "(J * ((mu * K) / ((1 + K) * (1 - (2 * K)))))");
+    check_expression("s.J * bulk_modulus(p.mu, p.K)", "(J * (mu / (3 * (1 - (2 * K)))))");
+}
+
+#[test]
+fn sums_are_written_out() {
+    check_expression("s.J * sum(0..3, |i| p.c[i])", "(J * ((c[0] + c[1]) + c[2]))");
+    check_expression(
+        "s.J * sum(1..3, |i| p.c[i - 1] * i as f64 + p.c[2])",
+        "(J * (((c[0] * 1) + c[2]) + ((c[1] * 2) + c[2])))",
+    );
+    check_expression(
+        "sum(0..2, |i| sum(0..2, |j| p.c[i + j] * s.J))",
+        "(((c[0] * J) + (c[1] * J)) + ((c[1] * J) + (c[2] * J)))",
+    );
+    // Yeoh's law.
+    check(
+        "/// Terms.\nconst N: usize = 3;\nfn energy_density(s: Strain, p: Parameters) -> f64 {\n\
+         sum(0..N, |i| p.c[i] * (s.I1bar - 3.0).powi(i as i32 + 1)) + p.K / 2.0 * (s.J - 1.0).powi(2)\n}",
+        "((((c[0] * (I1bar - 3)^1) + (c[1] * (I1bar - 3)^2)) + (c[2] * (I1bar - 3)^3)) + ((K / 2) * (J - 1)^2))",
+    );
+}
+
+#[test]
+fn helpers_and_constants() {
+    check(
+        "const THIRD: f64 = 1.0 / 3.0;\nconst TWO: f64 = 6.0 * THIRD;\n\
+         fn half(x: f64) -> f64 { let y = x / TWO; y }\n\
+         fn volumetric(q: Parameters, t: Strain) -> f64 { half(q.K) * (t.J - 1.0).powi(2) }\n\
+         fn energy_density(s: Strain, p: Parameters) -> f64 { half(p.mu) * (s.I1 - 3.0) + volumetric(p, s) }",
+        "((y:=(mu / (6 * (1 / 3))) * (I1 - 3)) + (y:=(K / (6 * (1 / 3))) * (J - 1)^2))",
+    );
+}
+
+#[test]
+fn parts_are_summed_in_the_order_of_the_file() {
+    let functions = "fn energy_density_volumetric(s: Strain, p: Parameters) -> f64 { p.K * ln(s.J).powi(2) }\n\
+                     fn energy_density_isochoric(s: Strain, p: Parameters) -> f64 { p.mu * (s.I1bar - 3.0) }";
+    check(functions, "((K * ln(J)^2) + (mu * (I1bar - 3)))");
+}
+
+#[test]
+fn well_known_laws() {
+    // Stable neo-Hookean, Smith et al. 2018, eq. 14.
+    check(
+        "fn energy_density(s: Strain, p: Parameters) -> f64 {\n\
+         let alpha = 1.0 + p.mu / p.K - p.mu / (4.0 * p.K);\n\
+         p.mu / 2.0 * (s.I1 - 3.0) + p.K / 2.0 * (s.J - alpha).powi(2) - p.mu / 2.0 * ln(s.I1 + 1.0)\n}",
+        "((((mu / 2) * (I1 - 3)) + ((K / 2) * (J - alpha:=((1 + (mu / K)) - (mu / (4 * K))))^2)) - ((mu / 2) * ln((I1 + 1))))",
+    );
+    // Mooney-Rivlin.
+    check_expression(
+        "p.c[0] * (s.I1bar - 3.0) + p.c[1] * (s.I2bar - 3.0) + p.c[2] / 2.0 * (s.J - 1.0).powi(2)",
+        "(((c[0] * (I1bar - 3)) + (c[1] * (I2bar - 3))) + ((c[2] / 2) * (J - 1)^2))",
+    );
+}
+
+#[test]
+fn metadata_is_kept() {
+    let text = "//! A law.\n//!\n//! Somewhere, eq. 1.\n#[domain(ln(J) * bound > -bound / 2.0)]\nstruct Parameters {\n\
+                /// A bound\n/// in two lines.\n#[unit(\"1\")] #[range(-0.5, 1e0)] #[default(0.25)] bound: f64,\n\
+                /// Stiffness.\n#[unit(\"N/m^2\")]\n#[range(1.0, 1e9)]\n#[default(1.0, 2.0)]\n#[per_element]\nc: [f64; 2],\n}\n\
+                fn energy_density(s: Strain, p: Parameters) -> f64 { p.c[0] * s.J + p.c[1] }";
+    let law = parse("some/where/a_law.rs", text);
+    assert_eq!((law.name.as_str(), law.path.as_str()), ("a_law", "some/where/a_law.rs"));
+    assert_eq!(law.text, text);
+    assert_eq!(law.docs, "A law.\n\nSomewhere, eq. 1.");
+    let [bound, c] = &law.parameters[..] else { panic!("two parameters") };
+    assert_eq!((bound.name.as_str(), bound.docs.as_str()), ("bound", "A bound\nin two lines."));
+    assert_eq!((bound.range, bound.len, bound.per_element), ((-0.5, 1.0), 1, false));
+    assert_eq!(bound.default, Some(vec![0.25]));
+    assert_eq!((c.range, c.len, c.per_element), ((1.0, 1e9), 2, true));
+    assert_eq!(c.default, Some(vec![1.0, 2.0]));
+    assert_eq!((c.unit.text.as_str(), c.unit.length, c.unit.stress, c.unit.time), ("N/m^2", 0, 1, 0));
+    let domain = law.domain.as_ref().expect("the file gives one");
+    assert_eq!(domain.text, "ln(J) * bound > -bound / 2.0");
+    assert_eq!(scalar(&law, &domain.left), "(ln(J) * bound)");
+    assert_eq!(scalar(&law, &domain.right), "(-bound / 2)");
+    assert!(law.parts.is_empty());
+}
+
+#[test]
+fn a_let_is_shared() {
+    let text = "//! A law.\nstruct Parameters {\n/// Stiffness.\n#[unit(\"Pa\")] #[range(1.0, 1e9)] mu: f64,\n}\n\
+                fn energy_density(s: Strain, p: Parameters) -> f64 { let x = s.J - p.mu; x * x }";
+    let law = parse("law.rs", text);
+    let ScalarNode::Mul(a, b) = &*law.energy else { panic!("a product") };
+    assert!(std::rc::Rc::ptr_eq(a, b));
+}
+
+#[test]
+fn the_shipped_laws() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../laws");
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(&folder).expect("laws/ is in the repository") {
+        let path = entry.expect("a readable entry").path();
+        if path.extension().is_some_and(|extension| extension == "rs") {
+            let text = std::fs::read_to_string(&path).expect("a readable law");
+            let law = parse(&path.display().to_string(), &text);
+            assert!(law.docs.contains("20") || law.docs.contains("eq."), "{} names no source", law.name);
+            let parts: Vec<&str> = law.parts.iter().map(|(name, _)| name.as_str()).collect();
+            found.push(format!(
+                "{} {} {}",
+                law.name,
+                law.domain.as_ref().map_or("everywhere", |d| &d.text),
+                parts.join(" ")
+            ));
+        }
+    }
+    found.sort();
+    for expected in [
+        "hooke everywhere ",
+        "neo_hookean J > 0.0 ",
+        "neo_hookean_isochoric J > 0.0 energy_density_isochoric energy_density_volumetric",
+        "st_venant_kirchhoff everywhere ",
+    ] {
+        assert!(found.iter().any(|law| law == expected), "{expected:?} is not in {found:#?}");
+    }
+}
+
+#[test]
+fn the_reference_shows_a_shipped_law() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../laws");
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect("laws/ is in the repository");
+    let reference = read("README.md");
+    let example = reference.split("```rust\n").nth(1).and_then(|rest| rest.split("```").next());
+    assert_eq!(example, Some(read("neo_hookean.rs").as_str()));
+}

@@ -1,0 +1,14 @@
+//! Hooke's law: linear elasticity of small strains, W = lambda/2 tr(eps)^2 + mu eps:eps.
+//! Faure, Zara, Jaillet & Moreau, An Implicit Tensor-Mass Solver on the GPU for Soft Bodies Simulation, VRIPHYS 2012,
+//! eq. 9.
+struct Parameters {
+    /// Young's modulus.
+    #[unit("Pa")] #[range(1e0, 1e12)] young: f64,
+    /// Poisson's ratio.
+    #[unit("1")] #[range(-0.9, 0.4999)] poisson: f64,
+}
+fn energy_density(s: Strain, p: Parameters) -> f64 {
+    let mu = shear_modulus(p.young, p.poisson);
+    let lambda = lame_lambda(p.young, p.poisson);
+    lambda / 2.0 * tr(s.eps).powi(2) + mu * ddot(s.eps, s.eps)
+}

@@ -1,0 +1,14 @@
+//! St. Venant-Kirchhoff solid: Hooke's law in the Green strain, W = lambda/2 tr(E)^2 + mu E:E.
+//! Faure, Zara, Jaillet & Moreau, An Implicit Tensor-Mass Solver on the GPU for Soft Bodies Simulation, VRIPHYS 2012,
+//! eq. 10.
+struct Parameters {
+    /// Young's modulus.
+    #[unit("Pa")] #[range(1e0, 1e12)] young: f64,
+    /// Poisson's ratio.
+    #[unit("1")] #[range(-0.9, 0.4999)] poisson: f64,
+}
+fn energy_density(s: Strain, p: Parameters) -> f64 {
+    let mu = shear_modulus(p.young, p.poisson);
+    let lambda = lame_lambda(p.young, p.poisson);
+    lambda / 2.0 * tr(s.E).powi(2) + mu * ddot(s.E, s.E)
+}
