@@ -187,7 +187,7 @@ fn sections(bytes: &[u8]) -> Result<Raw, Problem> {
             ("PartitionedEntities", Version::V4) => {
                 return Err(line.problem(
                     "the mesh is partitioned".to_owned(),
-                    "save it in one part: gmsh OLD.msh -unpartition -save -format msh41 -o NEW.msh",
+                    "mesh it again without -part, or save it as 2.2: gmsh OLD.msh -save -format msh22 -o NEW.msh",
                 ));
             }
             ("Nodes", Version::V2) => v2::nodes(&mut lines, &mut raw)?,

@@ -1,7 +1,7 @@
 //! The checks that every mesh passes before it becomes a [`TetMesh`](super::TetMesh).
 
 use super::error::{GroupKind, MeshError};
-use super::gradients::{determinant, norm, six_volumes, sub};
+use super::gradients::{norm, six_volumes, sub};
 use super::tet_mesh::{ElementId, Groups, NodeId, Orientation, TetMesh, face_of, sorted};
 use std::collections::BTreeSet;
 
@@ -75,15 +75,12 @@ fn numbered(tets: &[[NodeId; 4]]) -> impl Iterator<Item = (ElementId, &[NodeId; 
     tets.iter().enumerate().map(|(element, tet)| (ElementId(element as u32), tet))
 }
 
-/// Whether the volume is negligible against the longest edge cubed; true as well if it is not a number.
+/// Whether the volume is negligible against the longest edge cubed, or no number that can be divided by.
 fn is_flat(corners: &[[f64; 3]; 4]) -> bool {
-    let mut edges = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)].map(|(a, b)| sub(corners[b], corners[a]));
-    // Edges are scaled before they are multiplied, so that neither tiny nor huge units under- or overflow.
-    let scale = edges.iter().flatten().fold(0.0_f64, |scale, x| scale.max(x.abs()));
-    edges = edges.map(|edge| edge.map(|x| x / scale));
-    let longest = edges.iter().fold(0.0_f64, |longest, edge| longest.max(norm(*edge)));
-    let ratio = determinant(&[edges[0], edges[1], edges[2]]).abs() / 6.0 / longest.powi(3);
-    ratio.is_nan() || ratio < FLAT
+    let volume = six_volumes(corners).abs() / 6.0;
+    let edges = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+    let longest = edges.iter().fold(0.0_f64, |longest, (a, b)| longest.max(norm(sub(corners[*b], corners[*a]))));
+    !volume.is_normal() || volume < FLAT * longest.powi(3)
 }
 
 fn duplicates(tets: &[[NodeId; 4]]) -> Result<(), MeshError> {

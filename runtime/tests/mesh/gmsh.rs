@@ -267,7 +267,7 @@ const REFUSED: &[(&str, &str, &str, &str)] = &[
         "$NodeData",
         "$PartitionedEntities",
         "two.msh:55: the mesh is partitioned; \
-         save it in one part: gmsh OLD.msh -unpartition -save -format msh41 -o NEW.msh",
+         mesh it again without -part, or save it as 2.2: gmsh OLD.msh -save -format msh22 -o NEW.msh",
     ),
     (
         V2,
