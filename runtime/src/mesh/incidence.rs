@@ -6,7 +6,7 @@ use super::tet_mesh::{NodeId, TetMesh};
 ///
 /// Pass 1 of the two-pass assembly (Faure et al. 2012, algorithm 1) writes one partial force a slot; pass 2 sums the
 /// slots of each node in increasing order, hence always in the same order. Every slot occurs once, so no slot is ever
-/// undefined and none needs zeroing, unlike the padded PartialForce[slot][node] of the paper.
+/// undefined and none needs zeroing, unlike the padded `PartialForce[slot][node]` of the paper.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Incidence {
     offsets: Vec<u32>,
