@@ -81,7 +81,8 @@ fn survives(text: &str, overrides: &[Override]) {
         assert!(error.to_string().starts_with("--set "), "{error}");
         return;
     }
-    let line = text.split('\n').nth(at.line.wrapping_sub(1)).unwrap_or_else(|| panic!("no such line: {error}"));
+    let lines = if text.is_empty() { "\n" } else { text };
+    let line = lines.lines().nth(at.line.wrapping_sub(1)).unwrap_or_else(|| panic!("no such line: {error}"));
     assert_eq!(line.trim_end(), at.source_line, "another line: {error}");
     assert!((1..=line.chars().count() + 1).contains(&at.column), "no such column: {error}");
     assert!(error.to_string().contains("= help: "), "no remedy: {error}");

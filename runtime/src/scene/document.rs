@@ -100,7 +100,7 @@ fn convert(
     if depth > DEEPEST {
         return Err((
             span,
-            format!("more than {DEEPEST} tables inside each other"),
+            format!("more than {DEEPEST} tables or arrays inside each other"),
             "no scene needs that; take it apart",
         ));
     }
