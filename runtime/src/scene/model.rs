@@ -1,0 +1,484 @@
+//! What a scene says: mesh, materials, boundary conditions, loads, initial state, solver.
+//!
+//! These types are read by serde, and the JSON schema that checks scene text is made from them; a range written here
+//! is therefore the range that is enforced and the range that is documented. All quantities are in SI units.
+
+use super::output::{Output, Probe};
+use super::selection::Selection;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// A whole scene file, after defaults were filled in.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SceneData {
+    /// About the scene itself.
+    #[serde(default)]
+    pub scene: About,
+    /// The body: exactly one source of nodes and elements.
+    pub mesh: Mesh,
+    /// What the body is made of; one entry a law, or several of one law over different elements.
+    #[schemars(length(min = 1))]
+    pub material: Vec<Material>,
+    /// Nodes whose displacement is given.
+    #[serde(default)]
+    pub boundary: Vec<Boundary>,
+    /// Forces from outside.
+    #[serde(default)]
+    pub load: Vec<Load>,
+    /// The state at time 0; the displacement is zero.
+    #[serde(default)]
+    pub initial: Initial,
+    /// How the equations of motion or of equilibrium are solved.
+    pub solver: Solver,
+    /// Numbers to record at every step.
+    #[serde(default)]
+    pub probe: Vec<Probe>,
+    /// What is written for viewing.
+    #[serde(default)]
+    pub output: Output,
+}
+
+/// About the scene itself.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct About {
+    /// A title for reports.
+    #[serde(default)]
+    pub title: Option<String>,
+}
+
+/// Where the nodes and elements come from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, deny_unknown_fields)]
+pub enum Mesh {
+    /// A rectangular beam made by the program.
+    Beam {
+        /// The beam's size and division.
+        beam: Beam,
+    },
+    /// A mesh file.
+    File {
+        /// Path of the mesh file, relative to the scene file.
+        #[schemars(length(min = 1))]
+        file: PathBuf,
+        /// Renumber the nodes of inside-out elements instead of refusing them.
+        #[serde(default)]
+        orient: bool,
+        /// Length of the file's unit in m (0.001 for a mesh in mm), from 1e-9 to 1e9.
+        #[serde(default = "one")]
+        #[schemars(range(min = 1e-9, max = 1e9))]
+        scale: f64,
+    },
+}
+
+/// A rectangular beam with its edges along the axes: cells are hexahedra, each split into 6 tetrahedra.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Beam {
+    /// Edge lengths along x, y, z in m, each from 1e-9 to 1e6.
+    #[schemars(inner(range(min = 1e-9, max = 1e6)))]
+    pub size: [f64; 3],
+    /// Number of cells along x, y, z, each from 1 to 10000, 100000000 in all.
+    #[schemars(inner(range(min = 1, max = 10_000)))]
+    pub cells: [u32; 3],
+    /// The corner of least x, y, z in m, each within +-1e6.
+    #[serde(default)]
+    #[schemars(inner(range(min = -1e6, max = 1e6)))]
+    pub origin: [f64; 3],
+}
+
+/// A constitutive law with its parameters, over some elements.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Material {
+    /// A name for reports; unique.
+    #[serde(default)]
+    #[schemars(length(min = 1))]
+    pub name: Option<String>,
+    /// The law's name, as `tensormass law list` prints it.
+    #[schemars(length(min = 1))]
+    pub law: String,
+    /// Mass density at rest in kg/m3, above 0, at most 1e9.
+    #[schemars(range(max = 1e9), extend("exclusiveMinimum" = 0.0))]
+    pub density: f64,
+    /// The elements made of it; expressions and boxes test an element's centroid.
+    #[serde(default)]
+    pub elements: Selection,
+    /// The law's parameters by the law's own names; `tensormass law show NAME` gives units and ranges.
+    #[serde(default)]
+    pub parameters: BTreeMap<String, Parameter>,
+}
+
+/// A material parameter: one value for the whole material, or one for each element.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, deny_unknown_fields)]
+pub enum Parameter {
+    /// One value for all elements of the material.
+    Constant(ParameterValue),
+    /// One value an element, where the law allows it.
+    PerElement {
+        /// The values, in the order of the mesh's elements.
+        per_element: PerElement,
+    },
+}
+
+/// The value of a parameter, in the law's unit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum ParameterValue {
+    /// A number within +-1e30; the law's own range is checked later.
+    Number(#[schemars(range(min = -1e30, max = 1e30))] f64),
+    /// An array of numbers within +-1e30 (a direction, or the law's array of coefficients).
+    Array(#[schemars(length(min = 1), inner(range(min = -1e30, max = 1e30)))] Vec<f64>),
+}
+
+/// Values for each element of the mesh.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum PerElement {
+    /// A CSV file, relative to the scene file: one row an element of the mesh.
+    File(#[schemars(length(min = 1))] PathBuf),
+    /// The values themselves: one an element of the mesh.
+    Values(#[schemars(length(min = 1))] Vec<ParameterValue>),
+}
+
+/// A direction of space.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Axis {
+    /// Along x.
+    X,
+    /// Along y.
+    Y,
+    /// Along z.
+    Z,
+}
+
+impl Axis {
+    /// 0, 1 or 2.
+    pub fn index(self) -> usize {
+        match self {
+            Self::X => 0,
+            Self::Y => 1,
+            Self::Z => 2,
+        }
+    }
+}
+
+/// A Dirichlet condition: the displacement of some nodes, in some components, is given.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, deny_unknown_fields)]
+pub enum Boundary {
+    /// Components that stay at zero.
+    Fixed {
+        /// The nodes.
+        nodes: Selection,
+        /// The components of displacement that are held at zero.
+        #[schemars(length(min = 1))]
+        fix: Vec<Axis>,
+    },
+    /// Components that follow a given history.
+    Moved {
+        /// The nodes.
+        nodes: Selection,
+        /// The history of each moved component.
+        #[serde(rename = "move")]
+        motion: Motion,
+    },
+}
+
+impl Boundary {
+    /// The nodes that the condition holds for.
+    pub fn nodes(&self) -> &Selection {
+        match self {
+            Self::Fixed { nodes, .. } | Self::Moved { nodes, .. } => nodes,
+        }
+    }
+
+    /// Displacement in m of each component at a time in s; `None` where the component is free.
+    pub fn displacement(&self, time: f64) -> [Option<f64>; 3] {
+        match self {
+            Self::Fixed { fix, .. } => [Axis::X, Axis::Y, Axis::Z].map(|axis| fix.contains(&axis).then_some(0.0)),
+            Self::Moved { motion, .. } => {
+                [&motion.x, &motion.y, &motion.z].map(|history| history.as_ref().map(|history| history.value(time)))
+            }
+        }
+    }
+}
+
+/// The moved components; the others stay free.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Motion {
+    /// Displacement along x.
+    #[serde(default)]
+    pub x: Option<History>,
+    /// Displacement along y.
+    #[serde(default)]
+    pub y: Option<History>,
+    /// Displacement along z.
+    #[serde(default)]
+    pub z: Option<History>,
+}
+
+/// A displacement over time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum History {
+    /// A table of [time in s, displacement in m].
+    Ramp(Ramp),
+    /// A constant velocity in m/s from time 0 on, within +-1e6.
+    Velocity(#[schemars(range(min = -1e6, max = 1e6))] f64),
+}
+
+impl History {
+    /// Displacement in m at a time in s.
+    pub fn value(&self, time: f64) -> f64 {
+        match self {
+            Self::Ramp(ramp) => ramp.value(time),
+            Self::Velocity(velocity) => velocity * time,
+        }
+    }
+}
+
+/// A piecewise linear table of [time in s, value]: constant before its first and after its last row. Times are within
+/// 0 and 1e9, strictly increasing; values within +-1e12 (m for a displacement, a factor of 1 for a load).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Ramp(Vec<[f64; 2]>);
+
+impl Ramp {
+    /// The rows, [time in s, value].
+    pub fn rows(&self) -> &[[f64; 2]] {
+        &self.0
+    }
+
+    /// The value at a time in s.
+    pub fn value(&self, time: f64) -> f64 {
+        let after = self.0.partition_point(|row| row[0] <= time);
+        match (after.checked_sub(1).map(|i| self.0[i]), self.0.get(after)) {
+            (Some([t0, v0]), Some(&[t1, v1])) => v0 + (v1 - v0) * ((time - t0) / (t1 - t0)),
+            (Some([_, value]), None) | (None, Some(&[_, value])) => value,
+            (None, None) => 0.0,
+        }
+    }
+
+    /// The time in s after which the value no longer changes.
+    pub fn end(&self) -> f64 {
+        self.0.last().map_or(0.0, |row| row[0])
+    }
+}
+
+impl JsonSchema for Ramp {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Ramp".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({
+            "description": "A piecewise linear table of [time in s, value]: constant before its first and after its last row. \
+                            Times are within 0 and 1e9, strictly increasing; values within +-1e12 (m for a displacement, a \
+                            factor of 1 for a load).",
+            "type": "array",
+            "minItems": 1,
+            "items": {
+                "type": "array",
+                "prefixItems": [
+                    { "type": "number", "minimum": 0.0, "maximum": 1e9 },
+                    { "type": "number", "minimum": -1e12, "maximum": 1e12 }
+                ],
+                "minItems": 2,
+                "maxItems": 2
+            }
+        })
+    }
+}
+
+/// A force from outside. Loads add up; all of them keep their direction while the body moves.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Load {
+    /// Weight.
+    Gravity {
+        /// Acceleration in m/s2, each component within +-1e6.
+        #[schemars(inner(range(min = -1e6, max = 1e6)))]
+        acceleration: [f64; 3],
+        /// A factor over time, instead of 1.
+        #[serde(default)]
+        ramp: Option<Ramp>,
+    },
+    /// A force for each area at rest, on faces of the body's surface.
+    Traction {
+        /// The faces; expressions and boxes test a face's centroid at rest.
+        faces: Selection,
+        /// Force for each area at rest in Pa, each component within +-1e15.
+        #[schemars(inner(range(min = -1e15, max = 1e15)))]
+        value: [f64; 3],
+        /// A factor over time, instead of 1.
+        #[serde(default)]
+        ramp: Option<Ramp>,
+    },
+    /// Forces at nodes: exactly one of `value` and `total`.
+    Force {
+        /// The nodes.
+        nodes: Selection,
+        /// Force at every selected node in N, each component within +-1e15.
+        #[serde(default)]
+        #[schemars(inner(range(min = -1e15, max = 1e15)))]
+        value: Option<[f64; 3]>,
+        /// Force over all selected nodes together in N, in equal parts; each component within +-1e15.
+        #[serde(default)]
+        #[schemars(inner(range(min = -1e15, max = 1e15)))]
+        total: Option<[f64; 3]>,
+        /// A factor over time, instead of 1.
+        #[serde(default)]
+        ramp: Option<Ramp>,
+    },
+}
+
+impl Load {
+    /// The factor of 1 that the load has at a time in s.
+    pub fn factor(&self, time: f64) -> f64 {
+        match self {
+            Self::Gravity { ramp, .. } | Self::Traction { ramp, .. } | Self::Force { ramp, .. } => {
+                ramp.as_ref().map_or(1.0, |ramp| ramp.value(time))
+            }
+        }
+    }
+}
+
+/// The state at time 0.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Initial {
+    /// Velocity of every node in m/s, each component within +-1e6.
+    #[serde(default)]
+    #[schemars(inner(range(min = -1e6, max = 1e6)))]
+    pub velocity: [f64; 3],
+}
+
+/// How a step is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Integrator {
+    /// Implicit Euler: unconditionally stable for a convex energy, dissipative, first order.
+    ImplicitEuler,
+    /// Semi-implicit (symplectic) Euler: explicit, stable below the critical step, first order.
+    SemiImplicitEuler,
+    /// Central differences with mass damping: explicit, stable below the critical step, second order.
+    CentralDifference,
+    /// Equilibrium without inertia.
+    Static,
+}
+
+/// The number type of state and kernels.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Precision {
+    /// 32 bits, about 7 digits; every GPU has it.
+    F32,
+    /// 64 bits, about 16 digits.
+    #[default]
+    F64,
+}
+
+/// How the equations of motion or of equilibrium are solved.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Solver {
+    /// How a step is taken.
+    pub integrator: Integrator,
+    /// Time step in s, above 0, at most 1e6. Needed unless the integrator is `static`, where it divides `duration`
+    /// into increments.
+    #[serde(default)]
+    #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0.0))]
+    pub step: Option<f64>,
+    /// Simulated time in s, above 0, at most 1e9. Needed unless the integrator is `static`, where it is the time of
+    /// the ramps at which equilibrium is sought (without it: when all ramps have ended).
+    #[serde(default)]
+    #[schemars(range(max = 1e9), extend("exclusiveMinimum" = 0.0))]
+    pub duration: Option<f64>,
+    /// The number type of state and kernels.
+    #[serde(default)]
+    pub precision: Precision,
+    /// Mass-proportional damping alpha in 1/s, from 0 to 1e9; `static` has none.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1e9))]
+    pub mass_damping: f64,
+    /// The linear solver of `implicit-euler` and `static`.
+    #[serde(default)]
+    pub cg: ConjugateGradient,
+    /// The nonlinear solver of `implicit-euler` and `static`.
+    #[serde(default)]
+    pub newton: Newton,
+    /// CPU threads, from 0 to 1024; 0 takes all cores. Results do not depend on it.
+    #[serde(default)]
+    #[schemars(range(min = 0, max = 1024))]
+    pub threads: u32,
+}
+
+impl Solver {
+    /// Number of steps (of increments if `static`): `duration / step`, rounded up but for rounding errors. 1 for
+    /// `static` without a step. The simulated time is this times the step.
+    pub fn steps(&self) -> u64 {
+        match (self.duration, self.step) {
+            (Some(duration), Some(step)) => ((duration / step) * (1.0 - 1e-9)).ceil().max(1.0) as u64,
+            _ => 1,
+        }
+    }
+}
+
+/// The linear solver: conjugate gradients.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ConjugateGradient {
+    /// Stop when the residual's norm has fallen by this factor; above 0, below 1.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+    pub tolerance: f64,
+    /// Most iterations in one solution, from 1 to 1000000.
+    #[schemars(range(min = 1, max = 1_000_000))]
+    pub max_iterations: u32,
+    /// What the residual is multiplied by before each search direction.
+    pub preconditioner: Preconditioner,
+}
+
+impl Default for ConjugateGradient {
+    fn default() -> Self {
+        Self { tolerance: 1e-6, max_iterations: 2000, preconditioner: Preconditioner::Jacobi }
+    }
+}
+
+/// A preconditioner of conjugate gradients.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Preconditioner {
+    /// The inverse of the matrix's diagonal.
+    Jacobi,
+    /// None.
+    None,
+}
+
+/// The nonlinear solver: Newton's method.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Newton {
+    /// Stop when the residual's norm has fallen by this factor within the step; above 0, below 1.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+    pub tolerance: f64,
+    /// Most iterations in one step, from 1 to 10000; 1 takes one linearised step and asks for no convergence.
+    #[schemars(range(min = 1, max = 10_000))]
+    pub max_iterations: u32,
+}
+
+impl Default for Newton {
+    fn default() -> Self {
+        Self { tolerance: 1e-9, max_iterations: 30 }
+    }
+}
+
+fn one() -> f64 {
+    1.0
+}
