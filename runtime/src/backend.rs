@@ -49,6 +49,10 @@ pub trait Backend {
     fn project(&self, x: &mut Self::Vector);
     /// Sets the constrained components to these values, in the constraints' order.
     fn impose(&self, values: &[f64], x: &mut Self::Vector);
+    /// Sets the constrained components of y to these values minus those of x, in the constraints' order.
+    fn impose_change(&self, values: &[f64], x: &Self::Vector, y: &mut Self::Vector);
+    /// Replaces components that are not positive by their magnitude, and 0 by 1.
+    fn make_positive(&self, x: &mut Self::Vector);
     /// The unit round-off of the backend's precision.
     fn epsilon(&self) -> f64;
 }

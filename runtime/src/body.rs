@@ -63,6 +63,8 @@ pub struct Body {
     pub mass_damping: f64,
     /// The length of the bounding box's diagonal at rest.
     pub diameter: f64,
+    /// Volume at rest.
+    pub volume: f64,
 }
 
 impl Body {

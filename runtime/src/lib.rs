@@ -1,5 +1,23 @@
-//! Runtime.
+//! Soft bodies in motion: meshes, force fields, solvers, integrators, scenes and results.
+//!
+//! ```text
+//! scene file --scene--> Scene --build--> Body (scaled units) --System--> Backend + ForceField --integrate--> results
+//! ```
+//!
+//! Kernels come from `tensormass-kernels`; nothing here knows how they were derived. Integrators are written once over
+//! [`backend::Backend`] and [`backend::ForceField`]; [`cpu`] is the first backend.
 
+pub mod backend;
+pub mod body;
+pub mod cg;
+pub mod cpu;
+pub mod history;
+pub mod integrate;
 pub mod mesh;
-pub mod scene;
 pub mod output;
+pub mod scale;
+pub mod scene;
+pub mod step_limit;
+pub mod system;
+
+pub use tensormass_kernels::{LawEntry, LawInfo, Operations, ParameterInfo, Structure, law, laws};

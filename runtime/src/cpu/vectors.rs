@@ -135,6 +135,21 @@ impl<R: Precision> Backend for CpuBackend<R> {
         }
     }
 
+    fn impose_change(&self, values: &[f64], x: &Self::Vector, y: &mut Self::Vector) {
+        for (&(node, c), &value) in self.constrained.iter().zip(values) {
+            let (node, c) = (node as usize, c as usize);
+            y[node][c] = R::from_f64(value) - x[node][c];
+        }
+    }
+
+    fn make_positive(&self, x: &mut Self::Vector) {
+        let positive = |v: R| match v.to_f64() {
+            v if v == 0.0 || v.is_nan() => R::from_f64(1.0),
+            v => R::from_f64(v.abs()),
+        };
+        x.par_chunks_mut(BLOCK).for_each(|x| x.iter_mut().for_each(|x| *x = x.map(positive)));
+    }
+
     fn epsilon(&self) -> f64 {
         R::EPSILON
     }

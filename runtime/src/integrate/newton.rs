@@ -1,0 +1,293 @@
+//! Newton's method on m M (x - x_0) = forces, the equation that implicit steps and statics share.
+//!
+//! Each iteration solves with A = m M + k K at the current state by conjugate gradient. An iterate that leaves a law's
+//! domain, or that makes the residual larger, is taken back by half until it does neither. Norms are those of
+//! D = diag A; a residual at the level of rounding is as good as converged and is reported as such.
+
+use crate::backend::{Backend, ForceField, LeftDomain};
+use crate::cg::{CgLimits, CgOutcome, CgReport, ConjugateGradient, Operator};
+use crate::scene::Preconditioner;
+use crate::system::{SolveError, StepReport, System};
+
+/// When Newton's method stops.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NewtonLimits {
+    /// The residual's norm must fall by this factor.
+    pub tolerance: f64,
+    /// Iterations, at most; 1 takes one linearised step and asks for no convergence.
+    pub max_iterations: u32,
+}
+
+/// Settings of the implicit solvers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SolverSettings {
+    /// Linear solver.
+    pub cg: CgLimits,
+    /// Preconditioner of the linear solver.
+    pub preconditioner: Preconditioner,
+    /// Nonlinear solver.
+    pub newton: NewtonLimits,
+}
+
+/// Halvings of one Newton increment.
+const HALVINGS: u32 = 12;
+
+/// The equation of one implicit step: find x (imposed components given) with
+/// `force f(u_0 + displacement (x + v_0)) + constant - mass M x = 0` on the free components.
+pub(super) struct Equation<'a, B: Backend> {
+    /// Factor of M in A and in the residual.
+    pub mass: f64,
+    /// Factor of K in A.
+    pub stiffness: f64,
+    /// Displacement for each unit of x (and of v_0).
+    pub displacement: f64,
+    /// Factor of the forces.
+    pub force: f64,
+    /// The time at which loads are taken.
+    pub time: f64,
+    /// u_0.
+    pub u: &'a B::Vector,
+    /// v_0: the velocity at which x = 0 moves on; the first linearisation is taken at u_0 all the same.
+    pub velocity: Option<&'a B::Vector>,
+    /// What the residual has besides forces and inertia.
+    pub constant: Option<&'a B::Vector>,
+}
+
+impl<B: Backend> Equation<'_, B> {
+    /// The displacement at x.
+    fn displaced(&self, backend: &B, x: &B::Vector, u: &mut B::Vector) {
+        backend.copy(self.u, u);
+        backend.axpy(self.displacement, x, u);
+        if let Some(v) = self.velocity {
+            backend.axpy(self.displacement, v, u);
+        }
+    }
+
+    /// The residual at displacement u and, where given, x; projected.
+    fn residual<F: ForceField<B>>(
+        &self,
+        system: &mut System<B, F>,
+        u: &B::Vector,
+        x: Option<&B::Vector>,
+        r: &mut B::Vector,
+    ) -> Result<(), LeftDomain> {
+        system.force(u, self.time, r)?;
+        let backend = &system.backend;
+        backend.scale(self.force, r);
+        if let Some(constant) = self.constant {
+            backend.axpy(1.0, constant, r);
+        }
+        if let (Some(x), true) = (x, self.mass != 0.0) {
+            backend.multiply_add(-self.mass, &system.masses, x, r);
+        }
+        backend.project(r);
+        Ok(())
+    }
+}
+
+/// Work vectors of the implicit solvers.
+pub(super) struct Newton<B: Backend> {
+    cg: ConjugateGradient<B>,
+    diagonal: B::Vector,
+    ones: B::Vector,
+    residual: B::Vector,
+    scratch: B::Vector,
+    product: B::Vector,
+    increment: B::Vector,
+    trial: B::Vector,
+    u: B::Vector,
+}
+
+impl<B: Backend> Newton<B> {
+    pub fn new(backend: &B, nodes: usize) -> Self {
+        Self {
+            cg: ConjugateGradient::new(backend),
+            diagonal: backend.zeros(),
+            ones: backend.upload(&vec![[1.0; 3]; nodes]),
+            residual: backend.zeros(),
+            scratch: backend.zeros(),
+            product: backend.zeros(),
+            increment: backend.zeros(),
+            trial: backend.zeros(),
+            u: backend.zeros(),
+        }
+    }
+
+    /// Solves for x, which comes with its imposed components set and its free ones 0.
+    pub fn solve<F: ForceField<B>>(
+        &mut self,
+        system: &mut System<B, F>,
+        equation: &Equation<B>,
+        x: &mut B::Vector,
+        settings: &SolverSettings,
+    ) -> Result<StepReport, SolveError> {
+        let mut report = StepReport { forces: 1, ..StepReport::default() };
+        equation.residual(system, equation.u, None, &mut self.residual)?;
+        system.field.prepare(&system.backend, equation.u);
+        if let Some(v) = equation.velocity {
+            // The linearised force at u_0 + displacement v_0.
+            let factor = equation.force * equation.displacement;
+            system.field.add_dforce(&system.backend, v, factor, &mut self.residual);
+            system.backend.project(&mut self.residual);
+            report.products += 1;
+        }
+        self.diagonal(system, equation);
+        let linearised = settings.newton.max_iterations == 1;
+        // What the first linear solution has to balance: the scale of the residual.
+        let reference = if linearised { 0.0 } else { self.imbalance(system, equation, x) };
+        system.backend.copy(x, &mut self.increment);
+        account(&mut report, self.linear(system, equation, settings)?);
+        system.backend.copy(&self.increment, x);
+        if linearised {
+            return Ok(report);
+        }
+        let wanted = settings.newton.tolerance * reference;
+        let mut previous = f64::INFINITY;
+        for iteration in 1.. {
+            equation.displaced(&system.backend, x, &mut self.u);
+            equation.residual(system, &self.u, Some(x), &mut self.residual)?;
+            report.forces += 1;
+            let norm = self.norm(&system.backend);
+            let floor = self.rounding_floor(system, equation);
+            let stalled = norm > 0.5 * previous || iteration >= settings.newton.max_iterations;
+            if norm <= wanted.max(floor) || (stalled && norm <= 64.0 * floor) {
+                return Ok(report);
+            }
+            if iteration >= settings.newton.max_iterations {
+                return Err(not_converged(iteration, norm / reference, settings.newton.tolerance));
+            }
+            previous = norm;
+            system.field.prepare(&system.backend, &self.u);
+            self.diagonal(system, equation);
+            system.backend.clear(&mut self.increment);
+            account(&mut report, self.linear(system, equation, settings)?);
+            report.newton += 1;
+            self.backtrack(system, equation, x, norm, &mut report)?;
+        }
+        unreachable!("the last iteration returns")
+    }
+
+    /// x += the largest of increment, increment/2, .. that stays in the domain and lowers the residual.
+    fn backtrack<F: ForceField<B>>(
+        &mut self,
+        system: &mut System<B, F>,
+        equation: &Equation<B>,
+        x: &mut B::Vector,
+        norm: f64,
+        report: &mut StepReport,
+    ) -> Result<(), SolveError> {
+        let mut length = 1.0;
+        let mut outside = None;
+        for _ in 0..=HALVINGS {
+            system.backend.copy(x, &mut self.trial);
+            system.backend.axpy(length, &self.increment, &mut self.trial);
+            equation.displaced(&system.backend, &self.trial, &mut self.u);
+            report.forces += 1;
+            match equation.residual(system, &self.u, Some(&self.trial), &mut self.residual) {
+                Ok(()) if self.norm(&system.backend) <= (1.0 - 1e-4 * length) * norm => {
+                    system.backend.copy(&self.trial, x);
+                    return Ok(());
+                }
+                Ok(()) => {}
+                Err(e) => outside = Some(e),
+            }
+            length /= 2.0;
+        }
+        match outside {
+            Some(e) => Err(e.into()),
+            // No descent along a direction that was solved for: the residual is at the level of rounding or of the
+            // linear tolerance, which the caller's tests tell apart. x stays.
+            None => Ok(()),
+        }
+    }
+
+    fn operator<'a, F: ForceField<B>>(system: &'a System<B, F>, equation: &Equation<B>) -> Operator<'a, B> {
+        Operator { masses: &system.masses, mass: equation.mass, stiffness: equation.stiffness }
+    }
+
+    /// D = diag A at the prepared state.
+    fn diagonal<F: ForceField<B>>(&mut self, system: &mut System<B, F>, equation: &Equation<B>) {
+        let operator = Operator { masses: &system.masses, mass: equation.mass, stiffness: equation.stiffness };
+        operator.diagonal(&system.backend, &mut system.field, &mut self.diagonal);
+        system.backend.make_positive(&mut self.diagonal);
+    }
+
+    /// Solves A increment = residual at the prepared state.
+    fn linear<F: ForceField<B>>(
+        &mut self,
+        system: &mut System<B, F>,
+        equation: &Equation<B>,
+        settings: &SolverSettings,
+    ) -> Result<CgReport, SolveError> {
+        let operator = Operator { masses: &system.masses, mass: equation.mass, stiffness: equation.stiffness };
+        let preconditioner = match settings.preconditioner {
+            Preconditioner::Jacobi => &self.diagonal,
+            Preconditioner::None => &self.ones,
+        };
+        let (backend, field) = (&system.backend, &mut system.field);
+        let b = &self.residual;
+        let report = self.cg.solve(backend, field, &operator, preconditioner, b, &mut self.increment, settings.cg);
+        match report.outcome {
+            CgOutcome::Converged | CgOutcome::Stagnated | CgOutcome::NegativeCurvature => Ok(report),
+            CgOutcome::IterationCap => Err(SolveError::NotConverged {
+                solver: "linear",
+                iterations: report.iterations,
+                residual: report.residual,
+                tolerance: settings.cg.tolerance,
+                remedy: "raise solver.cg.max_iterations, loosen solver.cg.tolerance, or check that the supports prevent \
+                         rigid motion",
+            }),
+        }
+    }
+
+    /// The norm of residual - A x for x as given: imposed components only.
+    fn imbalance<F: ForceField<B>>(&mut self, system: &mut System<B, F>, equation: &Equation<B>, x: &B::Vector) -> f64 {
+        let operator = Operator { masses: &system.masses, mass: equation.mass, stiffness: equation.stiffness };
+        operator.apply(&system.backend, &mut system.field, x, &mut self.product);
+        let of_residual = self.norm(&system.backend);
+        system.backend.xpby(&self.residual, -1.0, &mut self.product);
+        system.backend.divide(&self.product, &self.diagonal, &mut self.scratch);
+        of_residual.max(system.backend.dot(&self.product, &self.scratch).max(0.0).sqrt())
+    }
+
+    /// sqrt (r . D^-1 r) of the residual.
+    fn norm(&mut self, backend: &B) -> f64 {
+        backend.divide(&self.residual, &self.diagonal, &mut self.scratch);
+        backend.dot(&self.residual, &self.scratch).max(0.0).sqrt()
+    }
+
+    /// What rounding alone leaves of the residual: of the forces K u, and of textbook stresses, whose error is that of
+    /// a strain of one rounding unit over an element's edge.
+    fn rounding_floor<F: ForceField<B>>(&mut self, system: &System<B, F>, equation: &Equation<B>) -> f64 {
+        let operator = Self::operator(system, equation);
+        let backend = &system.backend;
+        let edge = (system.body.volume / system.body.elements.len() as f64).cbrt();
+        let Self { u, ones, product, scratch, diagonal, .. } = self;
+        let mut of = |x: &B::Vector| {
+            // diag(K) x = (D - m M) x / k.
+            backend.clear(product);
+            backend.multiply_add(1.0 / operator.stiffness, diagonal, x, product);
+            backend.multiply_add(-operator.mass / operator.stiffness, operator.masses, x, product);
+            backend.project(product);
+            backend.divide(product, diagonal, scratch);
+            backend.dot(product, scratch).max(0.0).sqrt()
+        };
+        4.0 * backend.epsilon() * equation.force * (of(u) + edge * of(ones))
+    }
+}
+
+fn account(report: &mut StepReport, linear: CgReport) {
+    report.products += u64::from(linear.iterations) + 1;
+    report.stagnated += u64::from(linear.outcome == CgOutcome::Stagnated);
+    report.negative_curvature += u64::from(linear.outcome == CgOutcome::NegativeCurvature);
+}
+
+fn not_converged(iterations: u32, residual: f64, tolerance: f64) -> SolveError {
+    SolveError::NotConverged {
+        solver: "nonlinear",
+        iterations,
+        residual,
+        tolerance,
+        remedy: "take a smaller step, raise solver.newton.max_iterations or loosen solver.newton.tolerance",
+    }
+}

@@ -1,0 +1,164 @@
+//! A body on a backend: state, masses, loads and imposed motion over time, shared by all integrators.
+
+use crate::backend::{Backend, ForceField, LeftDomain};
+use crate::body::Body;
+
+/// Displacement and velocity at a time; positions are never stored.
+pub struct State<B: Backend> {
+    /// Displacement.
+    pub u: B::Vector,
+    /// Velocity.
+    pub v: B::Vector,
+    /// Time.
+    pub time: f64,
+    /// Steps taken.
+    pub step: u64,
+}
+
+/// Why a simulation cannot go on. What was computed before stays valid.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SolveError {
+    /// An element left its law's domain.
+    #[error("{0}; take a smaller step, ramp the loads more slowly, or use a law without a domain")]
+    LeftDomain(#[from] LeftDomain),
+    /// The state grew beyond all bounds.
+    #[error(
+        "the simulation diverged: the largest displacement is {largest:.3e} times the body's size; take a smaller step \
+         (the critical step is reported) or an implicit integrator"
+    )]
+    Diverged {
+        /// The largest displacement over the body's diameter.
+        largest: f64,
+    },
+    /// A linear or nonlinear solver gave up.
+    #[error(
+        "the {solver} solver did not converge: relative residual {residual:.3e} after {iterations} iterations, wanted \
+         {tolerance:.1e}; {remedy}"
+    )]
+    NotConverged {
+        /// "linear" or "nonlinear".
+        solver: &'static str,
+        /// Iterations taken.
+        iterations: u32,
+        /// Residual reached.
+        residual: f64,
+        /// Residual wanted.
+        tolerance: f64,
+        /// What to change.
+        remedy: &'static str,
+    },
+}
+
+/// A body on a backend.
+pub struct System<B: Backend, F: ForceField<B>> {
+    /// Vectors.
+    pub backend: B,
+    /// Elements.
+    pub field: F,
+    /// The body in scaled units.
+    pub body: Body,
+    /// Lumped masses, one entry a component.
+    pub masses: B::Vector,
+    loads: Vec<B::Vector>,
+}
+
+/// A displacement of this many body diameters is a divergence, not a motion: nothing in a scene moves that far that
+/// does not also rotate or fall as a whole, and explicit blow-ups pass it within a few steps.
+const DIVERGED: f64 = 1e4;
+
+impl<B: Backend, F: ForceField<B>> System<B, F> {
+    /// Puts a body on a backend.
+    pub fn new(backend: B, field: F, body: Body) -> Self {
+        let masses: Vec<[f64; 3]> = body.masses.iter().map(|&m| [m; 3]).collect();
+        let masses = backend.upload(&masses);
+        let loads = body.loads.iter().map(|l| backend.upload(&l.forces)).collect();
+        Self { backend, field, body, masses, loads }
+    }
+
+    /// The state at rest with this velocity everywhere, imposed components at their time-0 values.
+    pub fn initial_state(&self, velocity: [f64; 3]) -> State<B> {
+        let mut u = self.backend.zeros();
+        self.backend.impose(&self.body.imposed(0.0), &mut u);
+        let mut v = self.backend.upload(&vec![velocity; self.body.masses.len()]);
+        self.backend.project(&mut v);
+        State { u, v, time: 0.0, step: 0 }
+    }
+
+    /// f += the loads at a time.
+    pub fn add_loads(&self, time: f64, f: &mut B::Vector) {
+        for (load, vector) in self.body.loads.iter().zip(&self.loads) {
+            let factor = load.history.at(time);
+            if factor != 0.0 {
+                self.backend.axpy(factor, vector, f);
+            }
+        }
+    }
+
+    /// f = internal forces at u plus loads at a time.
+    ///
+    /// # Errors
+    /// An element is outside its law's domain.
+    pub fn force(&mut self, u: &B::Vector, time: f64, f: &mut B::Vector) -> Result<(), LeftDomain> {
+        self.backend.clear(f);
+        self.field.add_force(&self.backend, u, f)?;
+        self.add_loads(time, f);
+        Ok(())
+    }
+
+    /// Work of the loads against u: minus their potential, 0 at rest.
+    pub fn load_work(&self, u: &B::Vector, time: f64) -> f64 {
+        let loads = self.body.loads.iter().zip(&self.loads);
+        loads.map(|(load, vector)| load.history.at(time) * self.backend.dot(vector, u)).sum()
+    }
+
+    /// v . M v / 2.
+    pub fn kinetic_energy(&self, v: &B::Vector) -> f64 {
+        let mut p = self.backend.zeros();
+        self.backend.multiply_add(0.5, &self.masses, v, &mut p);
+        self.backend.dot(&p, v)
+    }
+
+    /// Refuses a state that has grown beyond all bounds.
+    ///
+    /// # Errors
+    /// [`SolveError::Diverged`].
+    pub fn check_bounded(&self, state: &State<B>) -> Result<(), SolveError> {
+        let moved = self.body.motions.iter().map(|m| m.at(state.time).abs()).fold(0.0, f64::max);
+        let largest = self.backend.max_abs(&state.u) / (self.body.diameter + moved);
+        if largest < DIVERGED { Ok(()) } else { Err(SolveError::Diverged { largest }) }
+    }
+}
+
+/// An integrator: takes a body from one time to the next.
+pub trait Integrator<B: Backend, F: ForceField<B>> {
+    /// Takes one step of length h.
+    ///
+    /// # Errors
+    /// The step failed; the state is then that before the step.
+    fn step(&mut self, system: &mut System<B, F>, state: &mut State<B>, h: f64) -> Result<StepReport, SolveError>;
+}
+
+/// What a step cost.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct StepReport {
+    /// Evaluations of the forces.
+    pub forces: u64,
+    /// Products with the tangent (CG iterations).
+    pub products: u64,
+    /// Newton iterations.
+    pub newton: u64,
+    /// Linear solutions that stopped because the precision was exhausted.
+    pub stagnated: u64,
+    /// Linear solutions that met a direction of negative curvature.
+    pub negative_curvature: u64,
+}
+
+impl std::ops::AddAssign for StepReport {
+    fn add_assign(&mut self, o: Self) {
+        self.forces += o.forces;
+        self.products += o.products;
+        self.newton += o.newton;
+        self.stagnated += o.stagnated;
+        self.negative_curvature += o.negative_curvature;
+    }
+}
