@@ -9,14 +9,19 @@
 
 pub mod backend;
 pub mod body;
+pub mod build;
 pub mod cg;
 pub mod cpu;
+mod frames;
 pub mod history;
 pub mod integrate;
 pub mod mesh;
 pub mod output;
+pub mod plan;
+pub mod probe;
 pub mod scale;
 pub mod scene;
+pub mod simulate;
 pub mod step_limit;
 pub mod system;
 

@@ -66,10 +66,15 @@ pub fn element_module(element: &ElementKernels) -> TokenStream {
             pub fn #name<R: Real>(#(#arguments),*) -> #result { #body }
         }
     });
+    let (gather, contract) = (element.gradient.count().arithmetic(), element.contract.count().arithmetic());
     quote! {
         #[doc = #docs]
         pub mod #module {
             use ::tensormass_kernels::Real;
+            /// Additions, multiplications and divisions of `gradient`.
+            pub const GRADIENT_OPERATIONS: u32 = #gather;
+            /// Additions, multiplications and divisions of `contract`.
+            pub const CONTRACT_OPERATIONS: u32 = #contract;
             /// Nodes of the element.
             pub const NODES: usize = #nodes;
             /// The gradients of the interpolation functions by the reference coordinates, one row a node.

@@ -1,0 +1,84 @@
+//! Supports and imposed motion: which components follow which history.
+
+use std::collections::BTreeMap;
+
+use super::place::Places;
+use crate::body::Constraint;
+use crate::history::History;
+use crate::mesh::TetMesh;
+use crate::scale::Scale;
+use crate::scene::{self, Axis, Boundary, Scene, SceneError};
+
+/// The constrained components, ascending, and the histories that they follow; in scaled units.
+pub fn constraints(
+    scene: &Scene,
+    mesh: &TetMesh,
+    places: &Places,
+    scale: &Scale,
+) -> Result<(Vec<Constraint>, Vec<History>), SceneError> {
+    let mut motions: Vec<History> = Vec::new();
+    // (node, component) -> (motion, boundary)
+    let mut found: BTreeMap<(u32, u8), (usize, usize)> = BTreeMap::new();
+    for (i, boundary) in scene.boundary.iter().enumerate() {
+        let path = format!("boundary.{i}.nodes");
+        let nodes = places.nodes(scene, &path, boundary.nodes())?;
+        for (component, history) in histories(boundary) {
+            let history = history.scaled(1.0 / scale.time, 1.0 / scale.length);
+            let motion = motions.iter().position(|m| *m == history).unwrap_or_else(|| {
+                motions.push(history);
+                motions.len() - 1
+            });
+            for &node in &nodes {
+                match found.insert((node, component), (motion, i)) {
+                    Some((other, first)) if other != motion => {
+                        let [x, y, z] = mesh.nodes()[node as usize];
+                        let axis = ["x", "y", "z"][component as usize];
+                        return Err(SceneError::at(
+                            scene.locate(&path),
+                            format!(
+                                "node {node} at ({x}, {y}, {z}) is already moved differently along {axis} by \
+                                 `boundary.{first}`"
+                            ),
+                            "let the two selections not overlap, or leave one component to one of them",
+                        ));
+                    }
+                    _ => {}
+                }
+            }
+        }
+    }
+    let constraints = found
+        .into_iter()
+        .map(|((node, component), (motion, _))| Constraint { node, component, motion })
+        .collect();
+    Ok((constraints, motions))
+}
+
+fn histories(boundary: &Boundary) -> Vec<(u8, History)> {
+    let index = |axis: Axis| axis.index() as u8;
+    match boundary {
+        Boundary::Fixed { fix, .. } => fix.iter().map(|&axis| (index(axis), History::constant(0.0))).collect(),
+        Boundary::Moved { motion, .. } => [(Axis::X, &motion.x), (Axis::Y, &motion.y), (Axis::Z, &motion.z)]
+            .into_iter()
+            .filter_map(|(axis, h)| h.as_ref().map(|h| (index(axis), history(h))))
+            .collect(),
+    }
+}
+
+/// A velocity is a table that ends after the longest duration a scene may have.
+const LONGEST: f64 = 1e9;
+
+fn history(h: &scene::History) -> History {
+    match h {
+        scene::History::Ramp(ramp) => table(ramp),
+        scene::History::Velocity(v) => {
+            History::table(vec![(0.0, 0.0), (LONGEST, v * LONGEST)]).expect("two finite, increasing entries")
+        }
+    }
+}
+
+/// The table of a ramp, whose times the scene has checked to increase.
+pub fn table(ramp: &scene::Ramp) -> History {
+    let rows = ramp.rows().iter().map(|r| (r[0], r[1])).collect();
+    History::table(rows).unwrap_or_else(|| History::constant(0.0))
+}

@@ -1,0 +1,91 @@
+//! Frames: fields of a state as VTU files and their PVD index.
+
+use std::path::{Path, PathBuf};
+
+use crate::mesh::TetMesh;
+use crate::output::{Field as Array, FieldValues, OutputError, PvdWriter, create_folder, write_vtu};
+use crate::probe::{Needs, current_volume, of_stress};
+use crate::scene::{Field, StressComponent};
+
+/// What a frame shows of a state, in SI units.
+#[derive(Debug, Default)]
+pub struct FrameData {
+    /// Displacement of each node in m.
+    pub displacement: Vec<[f64; 3]>,
+    /// Velocity of each node in m/s.
+    pub velocity: Vec<[f64; 3]>,
+    /// Cauchy stress of each element in Pa.
+    pub stresses: Vec<[f64; 9]>,
+    /// Strain energy of each element in J.
+    pub energies: Vec<f64>,
+}
+
+/// Writes the frames of a run.
+pub struct Frames {
+    folder: PathBuf,
+    index: PvdWriter,
+    fields: Vec<Field>,
+    tets: Vec<[u32; 4]>,
+    count: u32,
+}
+
+impl Frames {
+    /// Frames below this folder: `frames.pvd` and `frames/frame_NNNNNN.vtu`.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub fn create(out: &Path, mesh: &TetMesh, fields: &[Field]) -> Result<Self, OutputError> {
+        create_folder(&out.join("frames"))?;
+        let index = PvdWriter::create(&out.join("frames.pvd"))?;
+        let tets = mesh.tets().iter().map(|t| t.map(|n| n.0)).collect();
+        Ok(Self { folder: out.to_path_buf(), index, fields: fields.to_vec(), tets, count: 0 })
+    }
+
+    /// What the fields read of a state.
+    pub fn needs(&self) -> Needs {
+        let stresses = self.fields.iter().any(|f| matches!(f, Field::Cauchy | Field::VonMises));
+        let energies = self.fields.contains(&Field::EnergyDensity);
+        Needs { reactions: false, energies, stresses }
+    }
+
+    /// Writes one frame.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn write(&mut self, mesh: &TetMesh, time: f64, data: &FrameData) -> Result<(), OutputError> {
+        let mut points: Vec<(&str, usize, Vec<f64>)> = Vec::new();
+        let mut cells: Vec<(&str, usize, Vec<f64>)> = Vec::new();
+        let volume = |e: usize| current_volume(mesh, e, &data.displacement);
+        for field in &self.fields {
+            match field {
+                Field::Displacement => points.push(("displacement", 3, data.displacement.as_flattened().to_vec())),
+                Field::Velocity => points.push(("velocity", 3, data.velocity.as_flattened().to_vec())),
+                Field::Cauchy => cells.push(("cauchy", 9, data.stresses.as_flattened().to_vec())),
+                Field::VonMises => {
+                    let von_mises = data.stresses.iter().map(|s| of_stress(s, StressComponent::VonMises)).collect();
+                    cells.push(("von_mises", 1, von_mises));
+                }
+                Field::J => {
+                    let ratio = mesh.elements().map(|e| volume(e.index()) / mesh.volume(e)).collect();
+                    cells.push(("J", 1, ratio));
+                }
+                Field::EnergyDensity => {
+                    let density = mesh.elements().zip(&data.energies).map(|(e, w)| w / mesh.volume(e)).collect();
+                    cells.push(("energy_density", 1, density));
+                }
+            }
+        }
+        let name = format!("frames/frame_{:06}.vtu", self.count);
+        write_vtu(&self.folder.join(&name), mesh.nodes(), &self.tets, &arrays(&points), &arrays(&cells))?;
+        self.index.push(time, &name)?;
+        self.count += 1;
+        Ok(())
+    }
+}
+
+fn arrays<'a>(fields: &'a [(&'a str, usize, Vec<f64>)]) -> Vec<Array<'a>> {
+    fields
+        .iter()
+        .map(|(name, components, values)| Array { name, components: *components, values: FieldValues::F64(values) })
+        .collect()
+}

@@ -1,0 +1,148 @@
+//! What a scene will compute, and what it leaves out: laws, kernels, passes, memory.
+
+use serde_json::{Value, json};
+use tensormass_kernels::LawInfo;
+
+use crate::build::Model;
+use crate::scene::{Integrator, Precision, Scene};
+
+/// Operations of the linear tetrahedron around a point kernel, counted in its generated text.
+use tensormass_kernels::generated::tetrahedron_p1::{CONTRACT_OPERATIONS, GRADIENT_OPERATIONS};
+
+/// One law of a plan.
+#[derive(Debug, Clone)]
+pub struct PlannedLaw {
+    /// The law.
+    pub info: &'static LawInfo,
+    /// Elements.
+    pub elements: usize,
+    /// Constants stored: for each element, or once.
+    pub per_element: bool,
+    /// The kernels that will run, each with its operations an element.
+    pub kernels: Vec<(&'static str, u32)>,
+}
+
+/// What a scene will compute.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// Laws with their kernels.
+    pub laws: Vec<PlannedLaw>,
+    /// Passes in the order in which a step runs them.
+    pub passes: Vec<&'static str>,
+    /// Buffers with their bytes.
+    pub buffers: Vec<(&'static str, usize)>,
+    /// Elements of the mesh.
+    pub elements: usize,
+    /// What is modelled.
+    pub modelled: Vec<String>,
+    /// What is left out, and why.
+    pub left_out: Vec<String>,
+}
+
+/// The integrator's name in scenes.
+pub fn integrator_name(integrator: Integrator) -> &'static str {
+    match integrator {
+        Integrator::ImplicitEuler => "implicit-euler",
+        Integrator::SemiImplicitEuler => "semi-implicit-euler",
+        Integrator::CentralDifference => "central-difference",
+        Integrator::Static => "static",
+    }
+}
+
+/// The precision's name in scenes.
+pub fn precision_name(precision: Precision) -> &'static str {
+    match precision {
+        Precision::F32 => "f32",
+        Precision::F64 => "f64",
+    }
+}
+
+impl Plan {
+    /// The plan of a scene.
+    pub fn new(scene: &Scene, model: &Model) -> Self {
+        let implicit = match scene.solver.integrator {
+            Integrator::ImplicitEuler | Integrator::Static => true,
+            Integrator::SemiImplicitEuler | Integrator::CentralDifference => false,
+        };
+        let laws = model.body.batches.iter().map(|b| law(b.law.info, b.elements.len(), b.per_element, implicit)).collect();
+        let (nodes, elements) = (model.body.masses.len(), model.body.elements.len());
+        let real = match scene.solver.precision {
+            Precision::F32 => 4,
+            Precision::F64 => 8,
+        };
+        let vectors = if implicit { 20 } else { 6 };
+        let constants: usize = model.body.batches.iter().map(|b| b.constants.len()).sum();
+        let buffers = vec![
+            ("element nodes", 16 * elements),
+            ("rest data", 10 * real * elements),
+            ("material constants", real * constants),
+            ("partial forces", 12 * real * elements),
+            ("node slots", 4 * (4 * elements + nodes + 1)),
+            ("state and work vectors", vectors * 3 * real * nodes),
+        ];
+        let mut passes = vec!["elements: partial forces", "nodes: sum of slots"];
+        if implicit {
+            passes.extend(["elements: diagonal", "CG: elements: partial force differentials, nodes: sum, vectors"]);
+        }
+        passes.push("nodes: update of the state");
+        let (modelled, left_out) = scope(scene, model, implicit);
+        Self { laws, passes, buffers, elements, modelled, left_out }
+    }
+
+    /// Bytes an element over all buffers.
+    pub fn bytes_per_element(&self) -> f64 {
+        self.buffers.iter().map(|(_, b)| *b as f64).sum::<f64>() / self.elements as f64
+    }
+
+    /// The plan as JSON.
+    pub fn to_json(&self) -> Value {
+        let laws: Vec<Value> = self
+            .laws
+            .iter()
+            .map(|l| {
+                let kernels: serde_json::Map<String, Value> =
+                    l.kernels.iter().map(|(k, n)| ((*k).to_string(), json!(n))).collect();
+                json!({
+                    "law": l.info.name, "elements": l.elements, "constants_per_element": l.per_element,
+                    "operations_per_element": kernels, "reviewed": l.info.reviewed,
+                })
+            })
+            .collect();
+        let buffers: serde_json::Map<String, Value> =
+            self.buffers.iter().map(|(n, b)| ((*n).to_string(), json!(b))).collect();
+        json!({
+            "laws": laws, "passes": self.passes, "buffers_bytes": buffers,
+            "bytes_per_element": self.bytes_per_element(), "modelled": self.modelled, "left_out": self.left_out,
+        })
+    }
+}
+
+fn law(info: &'static LawInfo, elements: usize, per_element: bool, implicit: bool) -> PlannedLaw {
+    let point = |name: &str| info.operations.iter().find(|o| o.kernel == name).map_or(0, |o| o.arithmetic());
+    let gathers = if info.structure.linear { 1 } else { 2 };
+    let mut kernels = vec![("force", GRADIENT_OPERATIONS + point("force") + CONTRACT_OPERATIONS)];
+    if implicit {
+        kernels.push(("dforce", gathers * GRADIENT_OPERATIONS + point("dforce") + CONTRACT_OPERATIONS));
+        kernels.push(("diagonal", GRADIENT_OPERATIONS + 4 * point("diagonal")));
+    }
+    PlannedLaw { info, elements, per_element, kernels }
+}
+
+fn scope(scene: &Scene, model: &Model, implicit: bool) -> (Vec<String>, Vec<String>) {
+    let (mut modelled, mut left_out) = (vec![], vec![]);
+    let mut say = |included: bool, yes: String, no: &str| {
+        if included { modelled.push(yes) } else { left_out.push(no.to_string()) }
+    };
+    let inertia = scene.solver.integrator != Integrator::Static;
+    say(inertia, "inertia (lumped masses)".into(), "inertia: static equilibrium");
+    say(scene.solver.mass_damping > 0.0 && inertia, "mass damping".into(), "damping: solver.mass_damping is 0");
+    say(implicit, "tangent stiffness".into(), "tangent stiffness: the integrator is explicit");
+    let large = model.body.batches.iter().any(|b| !b.law.info.structure.linear);
+    say(large, "large deformation".into(), "large deformation: every law is linear, rotations are not modelled");
+    let moving = model.body.motions.iter().any(|m| !m.is_constant());
+    say(!model.body.constraints.is_empty(), format!("{} imposed components", model.body.constraints.len()), "supports: none given");
+    say(moving, "imposed motion".into(), "imposed motion: no boundary moves");
+    say(!model.body.loads.is_empty(), format!("{} loads", model.body.loads.len()), "loads: none given");
+    left_out.push("contact: this version has none".to_string());
+    (modelled, left_out)
+}

@@ -1,0 +1,438 @@
+//! Runs a scene: steps a model through time and writes probes, frames and the summary.
+
+use std::path::Path;
+use std::time::Instant;
+
+use serde_json::{Value, json};
+
+use crate::backend::{Backend, ForceField, LeftDomain};
+use crate::build::{BuildError, Model, build};
+use crate::cg::CgLimits;
+use crate::cpu::{CpuBackend, CpuField, Precision};
+use crate::frames::{FrameData, Frames};
+use crate::integrate::{CentralDifference, ImplicitEuler, NewtonLimits, SemiImplicitEuler, SolverSettings, Statics};
+use crate::output::{OutputError, ProbeTable, create_folder, write_json_atomic};
+use crate::plan::{Plan, integrator_name, precision_name};
+use crate::probe::{Energies, Needs, Snapshot};
+use crate::scene::{self, Scene};
+use crate::step_limit::{StepLimits, element_limit, power_limit};
+use crate::system::{Integrator, SolveError, State, StepReport, System};
+
+/// Why a run could not be carried out at all.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The scene cannot be computed.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// Results cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// Threads cannot be started.
+    #[error("cannot start {threads} threads: {reason}; set solver.threads to fewer")]
+    Threads {
+        /// Threads asked for.
+        threads: u32,
+        /// What the system said.
+        reason: String,
+    },
+}
+
+/// How a run ended. Results were written in every case.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ending {
+    /// All steps were taken.
+    Done,
+    /// The simulation failed; what was computed before is kept.
+    Failed(SolveError),
+    /// The observer asked to stop.
+    Interrupted,
+}
+
+/// A finished run.
+#[derive(Debug)]
+pub struct Outcome {
+    /// How it ended.
+    pub ending: Ending,
+    /// What `summary.json` says.
+    pub summary: Value,
+    /// Name, unit and last value of each probe.
+    pub probes: Vec<(String, &'static str, f64)>,
+    /// The critical steps in s, for integrators that step through time.
+    pub limits: Option<StepLimits>,
+    /// What is allowed but looks wrong.
+    pub warnings: Vec<String>,
+}
+
+/// Follows a run.
+pub trait Observer {
+    /// Something that the user should know before the run goes on.
+    fn warning(&mut self, text: &str);
+    /// The critical steps in s are known; nothing has been stepped yet.
+    fn limits(&mut self, limits: StepLimits);
+    /// This many of all steps are taken.
+    fn progress(&mut self, step: u64, steps: u64);
+    /// Whether to stop after the current step.
+    fn interrupted(&self) -> bool;
+}
+
+/// An observer that follows nothing.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Silent;
+
+impl Observer for Silent {
+    fn warning(&mut self, _: &str) {}
+    fn limits(&mut self, _: StepLimits) {}
+    fn progress(&mut self, _: u64, _: u64) {}
+    fn interrupted(&self) -> bool {
+        false
+    }
+}
+
+/// Runs a scene and writes its results into a folder, if one is given.
+///
+/// # Errors
+/// See [`RunError`]; a simulation that fails on its way is not an error but [`Ending::Failed`].
+pub fn run(scene: &Scene, out: Option<&Path>, observer: &mut (dyn Observer + Send)) -> Result<Outcome, RunError> {
+    let model = build(scene)?;
+    let threads = scene.solver.threads;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads as usize)
+        .build()
+        .map_err(|e| RunError::Threads { threads, reason: e.to_string() })?;
+    pool.install(|| match scene.solver.precision {
+        scene::Precision::F32 => Run::<f32>::new(scene, model).all(out, observer),
+        scene::Precision::F64 => Run::<f64>::new(scene, model).all(out, observer),
+    })
+}
+
+type Cpu<R> = System<CpuBackend<R>, CpuField<R>>;
+type Stepper<R> = Box<dyn Integrator<CpuBackend<R>, CpuField<R>>>;
+
+struct Run<'a, R: Precision> {
+    scene: &'a Scene,
+    model: Model,
+    system: Cpu<R>,
+    state: State<CpuBackend<R>>,
+    integrator: Stepper<R>,
+    /// Step length and number of steps, scaled units.
+    step: f64,
+    steps: u64,
+    cost: StepReport,
+    warnings: Vec<String>,
+    limits: Option<StepLimits>,
+}
+
+impl<'a, R: Precision> Run<'a, R> {
+    fn new(scene: &'a Scene, mut model: Model) -> Self {
+        let body = model.body.clone();
+        let nodes = body.masses.len();
+        let constrained = body.constraints.iter().map(|c| (c.node, c.component)).collect();
+        let backend = CpuBackend::<R>::new(nodes, constrained);
+        let field = CpuField::<R>::new(&body);
+        let integrator = integrator::<R>(scene, &backend, nodes);
+        let (seconds, steps) = stepping(scene);
+        let system = System::new(backend, field, body);
+        let state = system.initial_state(model.velocity);
+        let warnings = std::mem::take(&mut model.warnings);
+        let step = seconds / model.scale.time;
+        Self { scene, model, system, state, integrator, step, steps, cost: StepReport::default(), warnings, limits: None }
+    }
+
+    fn all(mut self, out: Option<&Path>, observer: &mut (dyn Observer + Send)) -> Result<Outcome, RunError> {
+        let started = Instant::now();
+        let mut results = Results::create(self.scene, &self.model, out)?;
+        self.measure_limits(observer);
+        for warning in &self.warnings {
+            observer.warning(warning);
+        }
+        let ending = match self.record(&mut results)? {
+            Err(e) => Ending::Failed(e.into()),
+            Ok(()) => self.step_through(&mut results, observer)?,
+        };
+        if ending != Ending::Done
+            && let Some(frames) = &mut results.frames
+        {
+            // The last state that was computed, wherever the run stopped.
+            let needs = Needs { reactions: false, energies: false, stresses: false };
+            if let Ok(data) = self.frame(needs) {
+                let time = self.state.time * self.model.scale.time;
+                frames.write(&self.model.mesh, time, &data)?;
+            }
+        }
+        let summary = self.summary(&ending, &results, started.elapsed().as_secs_f64());
+        if let Some(out) = out {
+            write_json_atomic(&out.join("summary.json"), &summary)?;
+            if let Ending::Failed(SolveError::LeftDomain(e)) = &ending {
+                write_json_atomic(&out.join("failure.json"), &self.failure(e))?;
+            }
+        }
+        let names = self.model.recorder.names();
+        let probes = names.iter().zip(&results.last).map(|((n, unit), v)| (n.clone(), *unit, *v)).collect();
+        Ok(Outcome { ending, summary, probes, limits: self.limits, warnings: self.warnings })
+    }
+
+    fn step_through(
+        &mut self,
+        results: &mut Results,
+        observer: &mut (dyn Observer + Send),
+    ) -> Result<Ending, RunError> {
+        for k in 1..=self.steps {
+            let stepped = self.integrator.step(&mut self.system, &mut self.state, self.step);
+            let done = stepped.and_then(|report| {
+                self.cost += report;
+                self.state.step = k;
+                // By multiplication, so that rounding does not add up over the steps.
+                self.state.time = self.step * k as f64;
+                self.system.check_bounded(&self.state)
+            });
+            if let Err(e) = done {
+                return Ok(Ending::Failed(e));
+            }
+            if let Err(e) = self.record(results)? {
+                return Ok(Ending::Failed(e.into()));
+            }
+            observer.progress(k, self.steps);
+            if k < self.steps && observer.interrupted() {
+                return Ok(Ending::Interrupted);
+            }
+        }
+        Ok(Ending::Done)
+    }
+
+    /// Measures the critical steps and warns of a step above them.
+    fn measure_limits(&mut self, observer: &mut (dyn Observer + Send)) {
+        if self.scene.solver.integrator == scene::Integrator::Static {
+            return;
+        }
+        let unit = self.model.scale.time;
+        let element = element_limit(&self.system.body);
+        let mut u = self.system.backend.zeros();
+        self.system.backend.copy(&self.state.u, &mut u);
+        let power = power_limit(&mut self.system, &u);
+        let limits = StepLimits { element: element * unit, power: power * unit };
+        self.limits = Some(limits);
+        observer.limits(limits);
+        let step = self.step * unit;
+        let explicit = matches!(
+            self.scene.solver.integrator,
+            scene::Integrator::SemiImplicitEuler | scene::Integrator::CentralDifference
+        );
+        if explicit && step > limits.power {
+            self.warnings.push(format!(
+                "the step {step:.4e} s is above the critical step {:.4e} s (power iteration): the simulation will blow up; \
+                 a step below {:.4e} s (element bound) is safe at rest",
+                limits.power, limits.element
+            ));
+        }
+    }
+
+    /// Records probes, and a frame where the scene wants one.
+    fn record(&mut self, results: &mut Results) -> Result<Result<(), LeftDomain>, OutputError> {
+        let snapshot = match self.snapshot(self.model.recorder.needs()) {
+            Ok(snapshot) => snapshot,
+            Err(e) => return Ok(Err(e)),
+        };
+        let time = self.state.time * self.model.scale.time;
+        results.last = self.model.recorder.read(&self.model.mesh, &snapshot);
+        if let Some(table) = &mut results.probes {
+            let mut row = vec![time];
+            row.extend(&results.last);
+            table.append(&row)?;
+        }
+        if let Some(frames) = &mut results.frames
+            && self.scene.output.wants_frame(self.state.step, self.steps)
+        {
+            let needs = frames.needs();
+            match self.frame(needs) {
+                Ok(data) => frames.write(&self.model.mesh, time, &data)?,
+                Err(e) => return Ok(Err(e)),
+            }
+        }
+        Ok(Ok(()))
+    }
+
+    fn snapshot(&mut self, needs: Needs) -> Result<Snapshot, LeftDomain> {
+        let scale = self.model.scale;
+        let mut snapshot = Snapshot { displacement: self.in_si(&self.state.u, scale.length), ..Snapshot::default() };
+        if needs.reactions {
+            let mut f = self.system.backend.zeros();
+            self.system.force(&self.state.u, self.state.time, &mut f)?;
+            snapshot.reactions = self.in_si(&f, -scale.force());
+        }
+        if needs.energies {
+            snapshot.energies = self.energies()?;
+        }
+        if needs.stresses {
+            snapshot.stresses = self.stresses();
+        }
+        Ok(snapshot)
+    }
+
+    fn frame(&mut self, needs: Needs) -> Result<FrameData, LeftDomain> {
+        let scale = self.model.scale;
+        let mut data = FrameData {
+            displacement: self.in_si(&self.state.u, scale.length),
+            velocity: self.in_si(&self.state.v, scale.velocity()),
+            stresses: self.stresses(),
+            ..FrameData::default()
+        };
+        if needs.energies {
+            let energies = self.system.field.element_energies(&self.state.u)?;
+            data.energies = energies.into_iter().map(|w| w * scale.energy()).collect();
+        } else {
+            data.energies = vec![f64::NAN; self.system.body.elements.len()];
+        }
+        Ok(data)
+    }
+
+    fn stresses(&self) -> Vec<[f64; 9]> {
+        let stress = self.model.scale.stress;
+        self.system.field.cauchy(&self.state.u).into_iter().map(|s| s.map(|x| x * stress)).collect()
+    }
+
+    fn energies(&mut self) -> Result<Energies, LeftDomain> {
+        let System { backend, field, .. } = &mut self.system;
+        let elastic = field.potential_energy(backend, &self.state.u)?;
+        let unit = self.model.scale.energy();
+        Ok(Energies {
+            kinetic: self.system.kinetic_energy(&self.state.v) * unit,
+            elastic: elastic * unit,
+            external: -self.system.load_work(&self.state.u, self.state.time) * unit,
+        })
+    }
+
+    fn in_si(&self, x: &Vec<[R; 3]>, unit: f64) -> Vec<[f64; 3]> {
+        self.system.backend.download(x).into_iter().map(|v| v.map(|c| c * unit)).collect()
+    }
+
+    fn summary(&mut self, ending: &Ending, results: &Results, wall: f64) -> Value {
+        let energies = self.energies().ok();
+        let scale = self.model.scale;
+        let probes: serde_json::Map<String, Value> =
+            self.model.recorder.names().iter().zip(&results.last).map(|((n, _), v)| (n.clone(), json!(v))).collect();
+        let plan = Plan::new(self.scene, &self.model);
+        let status = match ending {
+            Ending::Done => "done",
+            Ending::Failed(_) => "failed",
+            Ending::Interrupted => "interrupted",
+        };
+        let error = match ending {
+            Ending::Failed(e) => Some(e.to_string()),
+            Ending::Done | Ending::Interrupted => None,
+        };
+        json!({
+            "scene": self.scene.path().display().to_string(),
+            "title": self.scene.scene.title,
+            "status": status,
+            "error": error,
+            "device": "cpu",
+            "precision": precision_name(self.scene.solver.precision),
+            "integrator": integrator_name(self.scene.solver.integrator),
+            "nodes": self.model.mesh.nodes().len(),
+            "elements": self.model.mesh.tets().len(),
+            "steps": self.state.step,
+            "step_s": self.step * scale.time,
+            "simulated_time_s": self.state.time * scale.time,
+            "wall_time_s": wall,
+            "energies": energies.map(|e| json!({
+                "kinetic_J": e.kinetic, "elastic_J": e.elastic, "external_J": e.external, "total_J": e.total(),
+            })),
+            "probes": probes,
+            "step_limits": self.limits.map(|l| json!({ "element_s": l.element, "power_s": l.power })),
+            "solver": {
+                "force_evaluations": self.cost.forces,
+                "tangent_products": self.cost.products,
+                "newton_iterations": self.cost.newton,
+                "stagnated_solutions": self.cost.stagnated,
+                "negative_curvatures": self.cost.negative_curvature,
+            },
+            "units": { "length_m": scale.length, "stress_Pa": scale.stress, "time_s": scale.time },
+            "model": plan.to_json(),
+            "warnings": self.warnings,
+        })
+    }
+
+    /// The element that left its law's domain, by itself: enough to evaluate it again.
+    fn failure(&self, e: &LeftDomain) -> Value {
+        let nodes = self.system.body.elements[e.element as usize].map(|n| n as usize);
+        let u = self.in_si(&self.state.u, self.model.scale.length);
+        let material = self.model.materials.iter().find(|m| m.law.info.name == e.law);
+        json!({
+            "error": e.to_string(),
+            "law": e.law,
+            "parameters": material.map(|m| &m.parameters),
+            "element": e.element,
+            "time_s": self.state.time * self.model.scale.time,
+            "rest_positions_m": nodes.map(|n| self.model.mesh.nodes()[n]),
+            "last_displacements_m": nodes.map(|n| u[n]),
+        })
+    }
+}
+
+/// The files of a run.
+struct Results {
+    probes: Option<ProbeTable>,
+    frames: Option<Frames>,
+    last: Vec<f64>,
+}
+
+impl Results {
+    fn create(scene: &Scene, model: &Model, out: Option<&Path>) -> Result<Self, OutputError> {
+        let Some(out) = out else { return Ok(Self { probes: None, frames: None, last: vec![] }) };
+        create_folder(out)?;
+        let mut columns = vec!["time_s".to_string()];
+        columns.extend(model.recorder.names().iter().map(|(name, unit)| format!("{name} [{unit}]")));
+        let probes = ProbeTable::create(&out.join("probes.csv"), &columns)?;
+        let frames = match scene.output.frames {
+            Some(0) => None,
+            _ => Some(Frames::create(out, &model.mesh, &scene.output.fields)?),
+        };
+        Ok(Self { probes: Some(probes), frames, last: vec![] })
+    }
+}
+
+/// Step in s and number of steps; a static scene without a step takes its ramps to their ends at once.
+fn stepping(scene: &Scene) -> (f64, u64) {
+    let steps = scene.solver.steps();
+    let step = match (scene.solver.step, scene.solver.duration) {
+        (Some(step), Some(_)) => step,
+        (_, Some(duration)) => duration,
+        (_, None) => ramps_end(scene).max(1.0),
+    };
+    (step, steps)
+}
+
+/// The time in s at which the last ramp of a scene ends.
+fn ramps_end(scene: &Scene) -> f64 {
+    let loads = scene.load.iter().filter_map(|l| match l {
+        scene::Load::Gravity { ramp, .. } | scene::Load::Traction { ramp, .. } | scene::Load::Force { ramp, .. } => {
+            ramp.as_ref().map(scene::Ramp::end)
+        }
+    });
+    let motions = scene.boundary.iter().flat_map(|b| match b {
+        scene::Boundary::Fixed { .. } => vec![],
+        scene::Boundary::Moved { motion, .. } => [&motion.x, &motion.y, &motion.z]
+            .into_iter()
+            .filter_map(|h| match h {
+                Some(scene::History::Ramp(ramp)) => Some(ramp.end()),
+                Some(scene::History::Velocity(_)) | None => None,
+            })
+            .collect(),
+    });
+    loads.chain(motions).fold(0.0, f64::max)
+}
+
+fn integrator<R: Precision>(scene: &Scene, backend: &CpuBackend<R>, nodes: usize) -> Stepper<R> {
+    let solver = &scene.solver;
+    let settings = SolverSettings {
+        cg: CgLimits { tolerance: solver.cg.tolerance, max_iterations: solver.cg.max_iterations },
+        preconditioner: solver.cg.preconditioner,
+        newton: NewtonLimits { tolerance: solver.newton.tolerance, max_iterations: solver.newton.max_iterations },
+    };
+    match solver.integrator {
+        scene::Integrator::ImplicitEuler => Box::new(ImplicitEuler::new(backend, nodes, settings)),
+        scene::Integrator::SemiImplicitEuler => Box::new(SemiImplicitEuler::new(backend)),
+        scene::Integrator::CentralDifference => Box::new(CentralDifference::new(backend)),
+        scene::Integrator::Static => Box::new(Statics::new(backend, nodes, settings)),
+    }
+}
