@@ -134,7 +134,12 @@ impl<B: Backend> Newton<B> {
         self.diagonal(system, equation);
         let linearised = settings.newton.max_iterations == 1;
         // What the first linear solution has to balance: the scale of the residual.
-        let reference = if linearised { 0.0 } else { self.imbalance(system, equation, x) };
+        let reference = self.imbalance(system, equation, x);
+        system.backend.copy(equation.u, &mut self.u);
+        if reference <= self.rounding_floor(system, equation) {
+            // Nothing but rounding is out of balance: a solution would chase noise.
+            return Ok(report);
+        }
         system.backend.copy(x, &mut self.increment);
         account(&mut report, self.linear(system, equation, settings)?);
         system.backend.copy(&self.increment, x);
