@@ -134,10 +134,10 @@ impl<B: Backend> Newton<B> {
         self.diagonal(system, equation);
         let linearised = settings.newton.max_iterations == 1;
         // What the first linear solution has to balance: the scale of the residual.
-        let reference = self.imbalance(system, equation, x);
+        let reference = if linearised { 0.0 } else { self.imbalance(system, equation, x) };
         system.backend.copy(equation.u, &mut self.u);
-        if reference <= self.rounding_floor(system, equation) {
-            // Nothing but rounding is out of balance: a solution would chase noise.
+        if !linearised && reference <= self.rounding(system, equation, 0.0) {
+            // Nothing but the rounding of K u is out of balance: a solution would chase noise.
             return Ok(report);
         }
         system.backend.copy(x, &mut self.increment);
@@ -153,7 +153,9 @@ impl<B: Backend> Newton<B> {
             equation.residual(system, &self.u, Some(x), &mut self.residual)?;
             report.forces += 1;
             let norm = self.norm(&system.backend);
-            let floor = self.rounding_floor(system, equation);
+            // Textbook stresses err by a strain of one rounding unit over an element's edge.
+            let edge = (system.body.volume / system.body.elements.len() as f64).cbrt();
+            let floor = self.rounding(system, equation, edge);
             let stalled = norm > 0.5 * previous || iteration >= settings.newton.max_iterations;
             if norm <= wanted.max(floor) || (stalled && norm <= 64.0 * floor) {
                 return Ok(report);
@@ -261,12 +263,10 @@ impl<B: Backend> Newton<B> {
         backend.dot(&self.residual, &self.scratch).max(0.0).sqrt()
     }
 
-    /// What rounding alone leaves of the residual: of the forces K u, and of textbook stresses, whose error is that of
-    /// a strain of one rounding unit over an element's edge.
-    fn rounding_floor<F: ForceField<B>>(&mut self, system: &System<B, F>, equation: &Equation<B>) -> f64 {
+    /// What rounding alone leaves of the residual: of the forces K (u + offset).
+    fn rounding<F: ForceField<B>>(&mut self, system: &System<B, F>, equation: &Equation<B>, offset: f64) -> f64 {
         let operator = Self::operator(system, equation);
         let backend = &system.backend;
-        let edge = (system.body.volume / system.body.elements.len() as f64).cbrt();
         let Self { u, ones, product, scratch, diagonal, .. } = self;
         let mut of = |x: &B::Vector| {
             // diag(K) x = (D - m M) x / k.
@@ -277,7 +277,7 @@ impl<B: Backend> Newton<B> {
             backend.divide(product, diagonal, scratch);
             backend.dot(product, scratch).max(0.0).sqrt()
         };
-        4.0 * backend.epsilon() * equation.force * (of(u) + edge * of(ones))
+        4.0 * backend.epsilon() * equation.force * (of(u) + offset * of(ones))
     }
 }
 
