@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::mesh::TetMesh;
-use crate::output::{Field as Array, FieldValues, OutputError, PvdWriter, create_folder, write_vtu};
+use crate::output::{Field as Array, FieldValues, OutputError, PvdWriter, create_folder, remove_file, write_vtu};
 use crate::probe::{Needs, current_volume, of_stress};
 use crate::scene::{Field, StressComponent};
 
@@ -35,7 +35,16 @@ impl Frames {
     /// # Errors
     /// The folder cannot be written.
     pub fn create(out: &Path, mesh: &TetMesh, fields: &[Field]) -> Result<Self, OutputError> {
-        create_folder(&out.join("frames"))?;
+        let folder = out.join("frames");
+        create_folder(&folder)?;
+        // A longer earlier run would leave its last frames beside the new ones.
+        for k in 0.. {
+            let stale = folder.join(frame_name(k));
+            if !stale.exists() {
+                break;
+            }
+            remove_file(&stale)?;
+        }
         let index = PvdWriter::create(&out.join("frames.pvd"))?;
         let tets = mesh.tets().iter().map(|t| t.map(|n| n.0)).collect();
         Ok(Self { folder: out.to_path_buf(), index, fields: fields.to_vec(), tets, count: 0 })
@@ -75,12 +84,16 @@ impl Frames {
                 }
             }
         }
-        let name = format!("frames/frame_{:06}.vtu", self.count);
+        let name = format!("frames/{}", frame_name(self.count));
         write_vtu(&self.folder.join(&name), mesh.nodes(), &self.tets, &arrays(&points), &arrays(&cells))?;
         self.index.push(time, &name)?;
         self.count += 1;
         Ok(())
     }
+}
+
+fn frame_name(k: u32) -> String {
+    format!("frame_{k:06}.vtu")
 }
 
 fn arrays<'a>(fields: &'a [(&'a str, usize, Vec<f64>)]) -> Vec<Array<'a>> {

@@ -11,7 +11,7 @@ use crate::cg::CgLimits;
 use crate::cpu::{CpuBackend, CpuField, Precision};
 use crate::frames::{FrameData, Frames};
 use crate::integrate::{CentralDifference, ImplicitEuler, NewtonLimits, SemiImplicitEuler, SolverSettings, Statics};
-use crate::output::{OutputError, ProbeTable, create_folder, write_json_atomic};
+use crate::output::{OutputError, ProbeTable, create_folder, remove_file, write_json_atomic};
 use crate::plan::{Plan, integrator_name, precision_name};
 use crate::probe::{Energies, Needs, Snapshot};
 use crate::scene::{self, Scene};
@@ -380,6 +380,10 @@ impl Results {
     fn create(scene: &Scene, model: &Model, out: Option<&Path>) -> Result<Self, OutputError> {
         let Some(out) = out else { return Ok(Self { probes: None, frames: None, last: vec![] }) };
         create_folder(out)?;
+        // What an earlier run left under the names that this one may not write.
+        for stale in ["summary.json", "failure.json"] {
+            remove_file(&out.join(stale))?;
+        }
         let mut columns = vec!["time_s".to_string()];
         columns.extend(model.recorder.names().iter().map(|(name, unit)| format!("{name} [{unit}]")));
         let probes = ProbeTable::create(&out.join("probes.csv"), &columns)?;

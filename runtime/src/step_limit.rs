@@ -15,7 +15,7 @@ use crate::body::Body;
 use crate::cpu::Precision;
 use crate::system::System;
 
-/// The critical steps of a body, in its scaled unit of time.
+/// The critical steps of a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepLimits {
     /// Safe: from the largest element eigenvalue.

@@ -62,6 +62,17 @@ pub fn create_folder(path: &Path) -> Result<(), OutputError> {
     fs::create_dir_all(path).map_err(OutputError::io(path))
 }
 
+/// Removes a file, if it is there.
+///
+/// # Errors
+/// [`OutputError::Io`] if it is there and cannot be removed.
+pub fn remove_file(path: &Path) -> Result<(), OutputError> {
+    match fs::remove_file(path) {
+        Err(e) if e.kind() != ErrorKind::NotFound => Err(OutputError::io(path)(e)),
+        _ => Ok(()),
+    }
+}
+
 /// Writes a file under a temporary name in the same folder, then renames it: whoever reads `path` finds the old file or
 /// the whole new one, also if the program is killed. (It does not wait for the disk, so a power failure may still lose
 /// the newest files.)

@@ -6,7 +6,7 @@ mod json;
 mod pvd;
 mod vtu;
 
-pub use atomic::{OutputError, create_folder, write_atomic};
+pub use atomic::{OutputError, create_folder, remove_file, write_atomic};
 pub use csv::ProbeTable;
 pub use json::write_json_atomic;
 pub use pvd::PvdWriter;
