@@ -94,8 +94,10 @@ fn read(path: &Path) -> Result<Law, Failure> {
 fn failure(error: WorkerError) -> Failure {
     match error {
         WorkerError::Refused(message) => Failure::BadInput(vec![message]),
-        WorkerError::NotAvailable | WorkerError::Io(_) | WorkerError::Aborted | WorkerError::Unreadable(..) => {
-            Failure::Other(error.to_string())
-        }
+        WorkerError::NotAvailable
+        | WorkerError::Io(_)
+        | WorkerError::Lock { .. }
+        | WorkerError::Aborted
+        | WorkerError::Unreadable(..) => Failure::Other(error.to_string()),
     }
 }
