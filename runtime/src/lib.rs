@@ -4,4 +4,4 @@ pub mod mesh;
 pub mod scene;
 pub mod output;
 
-pub use tensormass_kernels::{law, laws, LawEntry, LawInfo, Operations, ParameterInfo, Structure};
+pub use tensormass_kernels::{LawEntry, LawInfo, Operations, ParameterInfo, Structure, law, laws};
