@@ -1,7 +1,7 @@
 //! The machine-wide lock of the computer algebra system.
 //!
-//! Symbolica's free licence allows one process a machine, and a second one aborts. Every process of this workspace
-//! that differentiates holds this lock until it exits, so that two builds, or a build beside the tests, wait for each
+//! Symbolica's free licence allows one process a machine, and a second one aborts. Whoever has a child process
+//! differentiate holds this lock until the child is gone, so that two builds, or a build beside the tests, wait for each
 //! other instead.
 
 use std::fs::{File, OpenOptions};

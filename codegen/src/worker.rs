@@ -1,13 +1,16 @@
 //! Differentiates in a child process: the same executable, called again with a job in its environment.
 //!
 //! The computer algebra system aborts its process when a second one runs on the machine. A child turns that into an
-//! error with a remedy, and ends, with the lock, as soon as its job is done.
+//! error with a remedy, and ends as soon as its job is done. The parent holds the machine-wide lock from before the
+//! child starts until it is gone: a child that let go of the lock itself would still be running for a moment, in which
+//! the next one would abort.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::derivation::{Derivation, DerivationError};
 use crate::law::ast::Law;
+use crate::lock;
 
 /// Holds the output folder and the law files of a child's job, one a line.
 const JOB: &str = "TENSORMASS_DERIVE_JOB";
@@ -23,6 +26,15 @@ pub enum WorkerError {
     /// The process could not be started, or its files not be read.
     #[error("cannot run the differentiation of laws: {0}")]
     Io(#[from] std::io::Error),
+    /// The machine-wide lock could not be taken.
+    #[error("cannot take the lock of differentiations, {}: {source}", .path.display())]
+    Lock {
+        /// The lock file.
+        path: PathBuf,
+        /// What the system said.
+        #[source]
+        source: std::io::Error,
+    },
     /// The computer algebra system aborted.
     #[error(
         "Symbolica aborted while it differentiated (signal 6). Its free licence allows one process a machine: another \
@@ -61,8 +73,6 @@ pub fn run_if_requested() {
 fn work(job: &str) -> Result<(), String> {
     let mut lines = job.lines();
     let out = PathBuf::from(lines.next().unwrap_or_default());
-    let _lock = crate::lock::MachineLock::acquire()
-        .map_err(|e| format!("cannot take the lock {}: {e}", crate::lock::path().display()))?;
     for path in lines {
         let text = std::fs::read_to_string(path).map_err(|e| format!("{path}: {e}"))?;
         let law = crate::law::parse(path, &text)
@@ -98,8 +108,9 @@ pub fn derive(laws: &[(PathBuf, Law)], out: &Path) -> Result<Vec<Derivation>, Wo
         job.push('\n');
         job.push_str(&path.to_string_lossy());
     }
-    let output =
-        Command::new(std::env::current_exe()?).env(JOB, job).env("SYMBOLICA_HIDE_BANNER", "1").output()?;
+    let lock = lock::MachineLock::acquire().map_err(|source| WorkerError::Lock { path: lock::path(), source })?;
+    let output = Command::new(std::env::current_exe()?).env(JOB, job).env("SYMBOLICA_HIDE_BANNER", "1").output()?;
+    drop(lock);
     if !output.status.success() {
         if aborted(output.status) {
             return Err(WorkerError::Aborted);

@@ -1,0 +1,43 @@
+//! `tensormass law`: the laws of this build, and derivations of law files.
+
+mod derive;
+mod list;
+mod show;
+
+use clap::Subcommand;
+
+use crate::failure::Failure;
+
+/// The subcommands of `tensormass law`.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// List the laws of this build.
+    List(list::Arguments),
+    /// Show one law: source, parameters, domain, structure and the operations of its kernels.
+    Show(show::Arguments),
+    /// Differentiate a law and write its derivation. `cargo xtask law accept` calls this.
+    #[command(hide = true)]
+    Derive(derive::Arguments),
+}
+
+/// Runs a subcommand.
+///
+/// # Errors
+/// See the subcommands.
+pub fn call(command: Command) -> Result<(), Failure> {
+    match command {
+        Command::List(arguments) => list::call(&arguments),
+        Command::Show(arguments) => show::call(&arguments),
+        Command::Derive(arguments) => derive::call(&arguments),
+    }
+}
+
+/// How the commands name a law whose committed derivation exists and fits, and one for which it does not.
+fn review(reviewed: bool) -> &'static str {
+    if reviewed { "reviewed" } else { "unreviewed" }
+}
+
+/// The names of this build's laws.
+fn names() -> Vec<&'static str> {
+    tensormass_runtime::laws().iter().map(|law| law.info.name).collect()
+}

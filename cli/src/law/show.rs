@@ -1,0 +1,125 @@
+//! `tensormass law show`: all that is known about one law.
+
+use serde_json::{Value, json};
+use tensormass_runtime::{LawInfo, Operations, ParameterInfo};
+
+use super::{names, review};
+use crate::failure::Failure;
+use crate::text;
+
+/// Arguments of `law show`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The law's name, as `law list` prints it.
+    name: String,
+    /// Print one object, for programs.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Prints one law.
+///
+/// # Errors
+/// No law has this name; the output cannot be written.
+pub fn call(arguments: &Arguments) -> Result<(), Failure> {
+    let name = &arguments.name;
+    let Some(law) = tensormass_runtime::law(name) else {
+        let remedy = text::suggest(name, &names(), "the laws of this build are");
+        return Err(Failure::bad_input(format!("there is no law `{name}`; {remedy}")));
+    };
+    if arguments.json { text::print_json(&json(law.info)) } else { text::print(&page(law.info)) }
+}
+
+/// A law as JSON.
+pub fn json(law: &LawInfo) -> Value {
+    json!({
+        "name": law.name,
+        "docs": law.docs,
+        "reviewed": law.reviewed,
+        "hash": format!("{:016x}", law.hash),
+        "domain": law.domain,
+        "parameters": law.parameters.iter().map(parameter_json).collect::<Value>(),
+        "constants": law.constants,
+        "structure": {
+            "linear": law.structure.linear,
+            "uses_j": law.structure.uses_j,
+            "polynomial": law.structure.polynomial,
+        },
+        "operations": law.operations.iter().map(operations_json).collect::<Value>(),
+    })
+}
+
+fn parameter_json(p: &ParameterInfo) -> Value {
+    json!({
+        "name": p.name,
+        "docs": p.docs,
+        "unit": p.unit,
+        "range": [p.range.0, p.range.1],
+        "default": p.default,
+        "per_element": p.per_element,
+        "components": p.len,
+    })
+}
+
+fn operations_json(o: &Operations) -> Value {
+    json!({
+        "kernel": o.kernel,
+        "additions": o.additions,
+        "multiplications": o.multiplications,
+        "divisions": o.divisions,
+        "functions": o.functions,
+        "selects": o.selects,
+        "arithmetic": o.arithmetic(),
+    })
+}
+
+/// A law as a page of text.
+fn page(law: &LawInfo) -> String {
+    let mut page = format!("{} ({})\n", law.name, review(law.reviewed));
+    for line in law.docs.lines() {
+        page += &format!("  {}\n", line.trim());
+    }
+    let facts = [
+        ["domain", law.domain.unwrap_or("everywhere")],
+        ["linear", if law.structure.linear { "yes: dP does not depend on G" } else { "no" }],
+        ["uses J", if law.structure.uses_j { "yes" } else { "no" }],
+        ["polynomial", if law.structure.polynomial { "yes: P and dP are polynomials in G" } else { "no" }],
+    ];
+    page += "\n";
+    page += &text::columns("", &facts.map(|row| row.map(String::from).to_vec()));
+    page += "\nparameters\n";
+    page += &text::columns("  ", &law.parameters.iter().map(parameter).collect::<Vec<_>>());
+    page += "\nconstants, computed once a material\n";
+    let constants = law.constants.iter().enumerate().map(|(k, c)| vec![k.to_string(), (*c).to_string()]);
+    page += &text::columns("  ", &constants.collect::<Vec<_>>());
+    page += "\noperations of one evaluation\n";
+    let mut rows = vec![["kernel", "+ -", "*", "/", "sum", "functions", "selects"].map(String::from).to_vec()];
+    rows.extend(law.operations.iter().map(|o| {
+        let counts = [o.additions, o.multiplications, o.divisions, o.arithmetic(), o.functions, o.selects];
+        std::iter::once(o.kernel.to_string()).chain(counts.map(|n| n.to_string())).collect()
+    }));
+    page += &text::columns("  ", &rows);
+    page
+}
+
+fn parameter(p: &ParameterInfo) -> Vec<String> {
+    let name = if p.len > 1 { format!("{}[{}]", p.name, p.len) } else { p.name.to_string() };
+    let default = match p.default {
+        None => "no default".to_string(),
+        Some(values) => format!("default {}", values.iter().copied().map(number).collect::<Vec<_>>().join(", ")),
+    };
+    let scope = if p.per_element { "per element" } else { "" };
+    vec![
+        name,
+        p.unit.to_string(),
+        format!("{} to {}", number(p.range.0), number(p.range.1)),
+        default,
+        scope.to_string(),
+        p.docs.lines().map(str::trim).collect::<Vec<_>>().join(" "),
+    ]
+}
+
+/// A number as one would write it in a scene: without an exponent where that is short.
+fn number(x: f64) -> String {
+    if x == 0.0 || (1e-3..1e6).contains(&x.abs()) { x.to_string() } else { format!("{x:e}") }
+}

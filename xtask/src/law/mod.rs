@@ -1,0 +1,4 @@
+//! Tasks about laws.
+
+pub mod accept;
+pub mod unreviewed;
