@@ -73,6 +73,7 @@ pub struct GeneratedLaw {
 ///     tensormass_codegen::build("laws");
 /// }
 /// ```
+#[allow(clippy::needless_doctest_main, reason = "the example is a whole build script")]
 pub fn build(laws: &str) {
     worker::run_if_requested();
     println!("cargo::rerun-if-changed=build.rs");
