@@ -23,6 +23,7 @@ pub mod law;
 pub mod lock;
 #[cfg(feature = "derive")]
 mod lower;
+pub mod oracle;
 pub mod print;
 #[cfg(feature = "derive")]
 mod quantity;

@@ -52,7 +52,7 @@ pub fn element_module(element: &ElementKernels) -> TokenStream {
     let docs = element.docs;
     let nodes = element.nodes as usize;
     let rows = element.reference_gradients.iter().map(|row| {
-        let row = row.map(|q| float(q));
+        let row = row.map(float);
         quote!([#(#row),*])
     });
     let functions = [&element.gradient, &element.contract, &element.node_gradients].map(|kernel| {

@@ -1,0 +1,70 @@
+//! The law files themselves as an oracle: compiled by rustc over second-order dual numbers that stand in for `f64`.
+//!
+//! The text of each law goes through `syn` alone (`tensormass_codegen::oracle`): neither our parser nor the symbolic
+//! engine is between it and the W, dW and d2W that it gives here. The four parts of a dual number are numbers that
+//! carry their rounding bound, and so are the kernels' results: the sum of the two is the tolerance.
+
+use tensormass_kernels::{LawEntry, laws};
+use tensormass_testing::point::Point;
+use tensormass_testing::random::Rng;
+use tensormass_testing::rounding::{DOUBLE, Rounded};
+use tensormass_testing::tensor::exact;
+
+#[path = "oracle/prelude.rs"]
+#[allow(dead_code, reason = "the whole law language; the laws of one build need not use all of it")]
+mod prelude;
+
+include!(concat!(env!("TENSORMASS_GENERATED"), "/oracle/all.rs"));
+
+/// Ordinary states, small strains under any rotation, and large ones.
+const STRETCHES: [(f64, f64); 3] = [(0.5, 2.0), (0.99, 1.01), (0.2, 5.0)];
+const STATES: u64 = 40;
+
+/// Compares W, P and dP of a law with those of its own text at one state.
+fn check(law: &'static LawEntry, seed: u64, stretch: (f64, f64)) {
+    let name = law.info.name;
+    let energy = ORACLE.iter().find(|(n, _)| *n == name).expect("every law has an oracle").1;
+    let mut rng = Rng::new(seed);
+    let point = Point::new(env!("TENSORMASS_GENERATED"), law, rng.parameters(law.info));
+    let mut g = rng.gradient(stretch.0, stretch.1);
+    if law.info.domain.is_none() && seed % 4 == 3 {
+        // Everywhere is everywhere: inverted states too.
+        g[2] = -g[2];
+        g[5] = -g[5];
+        g[8] = -2.0 - g[8];
+    }
+    let d = rng.direction();
+    let parameters: Vec<_> = point.parameters.iter().map(|&p| prelude::seeded(p, 0.0, 0.0)).collect();
+    let (p, dp) = (point.force(&exact(&g)), point.dforce(&exact(&g), &exact(&d)));
+    // W counts from rest: its value there has no meaning.
+    let at_rest = energy(prelude::Strain::of([prelude::seeded(0.0, 0.0, 0.0); 9]), &parameters).x;
+    let w = point.energy(&exact(&g)) - point.energy(&exact(&[0.0; 9]));
+    let compare = |what: &str, kernel: Rounded, oracle: Rounded, magnitude: f64| {
+        let (difference, tolerance) =
+            ((kernel.value - oracle.value).abs(), kernel.bound(DOUBLE) + oracle.bound(DOUBLE));
+        let (kernel, oracle) = (kernel.value, oracle.value);
+        let context = format!("{name}, seed {seed}, parameters {:?}, G {g:?}, dG {d:?}", point.parameters);
+        assert!(difference <= tolerance, "{what}: {kernel} against {oracle}, tolerance {tolerance:e}; {context}");
+        // What the bound may take of the tangent's magnitude before the comparison proves nothing.
+        assert!(tolerance <= 1e-9 * magnitude, "{what}: tolerance {tolerance:e} of {magnitude:e}; {context}");
+    };
+    let magnitude = |a: &[Rounded]| a.iter().fold(0.0f64, |m, x| m.max(x.value.abs()));
+    let scale = magnitude(&dp).max(magnitude(&p));
+    for k in 0..9 {
+        let seeded = std::array::from_fn(|m| prelude::seeded(g[m], if m == k { 1.0 } else { 0.0 }, d[m]));
+        let result = energy(prelude::Strain::of(seeded), &parameters);
+        compare("W", w, result.x - at_rest, scale);
+        compare(&format!("P{k}"), p[k], result.a, scale);
+        compare(&format!("dP{k}"), dp[k], result.c, scale);
+    }
+}
+
+#[test]
+fn kernels_are_the_derivatives_of_the_law_text() {
+    assert_eq!(ORACLE.len(), laws().len());
+    for law in laws() {
+        for stretch in STRETCHES {
+            (0..STATES).for_each(|seed| check(law, seed, stretch));
+        }
+    }
+}

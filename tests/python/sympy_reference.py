@@ -1,0 +1,395 @@
+#!/usr/bin/env python3
+"""Reference values of every reviewed law by SymPy, from the law file's own text.
+
+The text is read by the small parser below, which shares nothing with the generator's; SymPy differentiates the energy
+along lines through exact rational states, and mpmath evaluates to 40 digits, of which 25 are written. `cargo test`
+compares the kernels with the committed values and needs no Python; CI runs this script with --check.
+
+    python3 tests/python/sympy_reference.py [--check] [NAME ..]      (needs sympy, tested with 1.14)
+
+writes tests/reference/sympy/NAME.json, or with --check compares and exits with status 1 where a file differs.
+"""
+
+import json
+import re
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import sympy as sp
+
+ROOT = Path(__file__).resolve().parents[2]
+TOKEN = re.compile(
+    r"\s*(?:(\d+\.(?!\.)\d*(?:[eE][+-]?\d+)?|\d+[eE][+-]?\d+)|(\d+)|([A-Za-z_]\w*)|(\.\.|->|<=|>=|.))", re.S
+)
+S, H = sp.symbols("s h")
+
+
+class Law:
+    """A law file: parameters, domain, functions and constants, evaluated over SymPy values."""
+
+    def __init__(self, text):
+        text = re.sub(r"//[^\n]*", "", text)
+        self.tokens = [next((k, t) for k, t in enumerate(m.groups()) if t) for m in TOKEN.finditer(text.rstrip())]
+        self.at = 0
+        self.parameters, self.functions, self.constants, self.domain = [], {}, {}, None
+        while self.at < len(self.tokens):
+            self.item()
+
+    def peek(self, ahead=0):
+        at = self.at + ahead
+        return self.tokens[at][1] if at < len(self.tokens) else None
+
+    def next(self, expected=None):
+        token = self.peek()
+        if expected is not None and token != expected:
+            raise SyntaxError(f"expected {expected!r}, found {token!r} (token {self.at})")
+        self.at += 1
+        return token
+
+    def accept(self, token):
+        if self.peek() == token:
+            self.at += 1
+            return True
+        return False
+
+    # ---- items ----
+
+    def attribute(self):
+        """#[name(..)]: the name, and the place of what is in the parentheses."""
+        self.next("#"), self.next("[")
+        name, start = self.next(), self.at + 1
+        depth = 1
+        while depth:
+            depth += {"[": 1, "]": -1}.get(self.next(), 0)
+        return name, start
+
+    def at_place(self, place, read):
+        here, self.at = self.at, place
+        value = read()
+        self.at = here
+        return value
+
+    def item(self):
+        while self.peek() == "#":
+            name, place = self.attribute()
+            if name == "domain":
+                self.domain = place
+        word = self.next()
+        if word == "struct":
+            self.struct()
+        elif word == "const":
+            name = self.next()
+            self.next(":"), self.next(), self.next("=")
+            self.constants[name] = self.expression({})
+            self.next(";")
+        elif word == "fn":
+            self.function()
+        else:
+            raise SyntaxError(f"unexpected {word!r}")
+
+    def struct(self):
+        self.next(), self.next("{")
+        while not self.accept("}"):
+            unit, bounds, length = "1", None, None
+            while self.peek() == "#":
+                name, place = self.attribute()
+                if name == "unit":
+                    unit = self.at_place(place, self.string)
+                elif name == "range":
+                    bounds = self.at_place(place, lambda: self.arguments({}, ")"))
+            name = self.next()
+            self.next(":")
+            if self.accept("["):
+                self.next("f64"), self.next(";")
+                length = int(self.next())
+                self.next("]")
+            else:
+                self.next("f64")
+            self.accept(",")
+            self.parameters.append((name, unit, bounds, length))
+
+    def string(self):
+        self.next('"')
+        text = ""
+        while self.peek() != '"':
+            text += self.next()
+        return text
+
+    def function(self):
+        name = self.next()
+        self.next("(")
+        arguments = []
+        while not self.accept(")"):
+            arguments.append(self.next())
+            self.next(":"), self.next(), self.accept(",")
+        self.next("->"), self.next("f64"), self.next("{")
+        self.functions[name] = (arguments, self.at)
+        depth = 1
+        while depth:
+            depth += {"{": 1, "}": -1}.get(self.next(), 0)
+
+    def call(self, name, values):
+        names, place = self.functions[name]
+        return self.at_place(place, lambda: self.body(dict(zip(names, values))))
+
+    def body(self, scope):
+        while self.accept("let"):
+            name = self.next()
+            if self.accept(":"):
+                self.next()
+            self.next("=")
+            scope[name] = self.expression(scope)
+            self.next(";")
+        return self.expression(scope)
+
+    # ---- expressions: evaluated as they are read ----
+
+    def arguments(self, scope, end):
+        values = []
+        while not self.accept(end):
+            values.append(self.condition(scope))
+            self.accept(",")
+        return values
+
+    def condition(self, scope):
+        left = self.expression(scope)
+        comparison = self.peek()
+        if comparison in ("<", ">", "<=", ">="):
+            self.next()
+            return comparison, left, self.expression(scope)
+        return left
+
+    def expression(self, scope):
+        value = self.term(scope)
+        while self.peek() in ("+", "-"):
+            sign = 1 if self.next() == "+" else -1
+            value = value + sign * self.term(scope)
+        return value
+
+    def term(self, scope):
+        value = self.cast(scope)
+        while self.peek() in ("*", "/"):
+            divide = self.next() == "/"
+            factor = self.cast(scope)
+            value = value / factor if divide else value * factor
+        return value
+
+    def cast(self, scope):
+        value = self.unary(scope)
+        while self.accept("as"):
+            value = sp.Integer(value) if self.next() == "f64" else int(value)
+        return value
+
+    def unary(self, scope):
+        return -self.unary(scope) if self.accept("-") else self.postfix(scope)
+
+    def postfix(self, scope):
+        value = self.primary(scope)
+        while True:
+            if self.peek() == ".":
+                self.next()
+                name = self.next()
+                value = FUNCTIONS[name](value, *self.arguments(scope, ")")) if self.accept("(") else value[name]
+            elif self.accept("["):
+                value = value[int(self.expression(scope))]
+                self.next("]")
+            else:
+                return value
+
+    def primary(self, scope):
+        kind, token = self.tokens[self.at]
+        self.at += 1
+        if kind == 0:
+            return sp.Rational(token)
+        if kind == 1:
+            return int(token)
+        if token == "(":
+            value = self.expression(scope)
+            self.next(")")
+            return value
+        if token == "sum" and self.peek() == "(":
+            return self.sum(scope)
+        if self.accept("("):
+            values = self.arguments(scope, ")")
+            return self.call(token, values) if token in self.functions else FUNCTIONS[token](*values)
+        return scope[token] if token in scope else self.constants[token]
+
+    def sum(self, scope):
+        self.next("(")
+        low = self.expression(scope)
+        self.next("..")
+        high = self.expression(scope)
+        self.next(","), self.next("|")
+        name = self.next()
+        self.next("|")
+        place = self.at
+        total = 0
+        for i in range(low, high):
+            self.at = place
+            total = total + self.expression({**scope, name: i})
+        self.accept(","), self.next(")")
+        return total
+
+    def energy(self, strain, parameters):
+        parts = [name for name in self.functions if name.startswith("energy_density")]
+        return sum(self.call(name, [strain, parameters]) for name in parts)
+
+    def inside(self, strain, parameters):
+        if self.domain is None:
+            return True
+        condition = self.at_place(self.domain, lambda: self.condition({**strain, **parameters}))
+        return holds(condition)
+
+
+def holds(condition):
+    comparison, left, right = condition
+    difference = sp.sympify(left - right).subs({S: 0, H: 0}).evalf(40)
+    return bool({"<": difference < 0, ">": difference > 0, "<=": difference <= 0, ">=": difference >= 0}[comparison])
+
+
+def ddot(a, b):
+    return sum(x * y for x, y in zip(a, b))
+
+
+FUNCTIONS = {
+    "ln": sp.log,
+    "exp": sp.exp,
+    "sqrt": sp.sqrt,
+    "powi": lambda x, n: x**n,
+    "powf": lambda x, a: x**a,
+    "pos": lambda x: x if holds((">", x, 0)) else sp.Integer(0),
+    "select": lambda c, a, b: a if holds(c) else b,
+    "tr": lambda a: a.trace(),
+    "ddot": ddot,
+    "det": lambda a: a.det(),
+    "identity": lambda: sp.eye(3),
+    "shear_modulus": lambda e, nu: e / (2 * (1 + nu)),
+    "lame_lambda": lambda e, nu: e * nu / ((1 + nu) * (1 - 2 * nu)),
+    "bulk_modulus": lambda e, nu: e / (3 * (1 - 2 * nu)),
+}
+
+
+def strain(g):
+    f = sp.eye(3) + g
+    c = f.T * f
+    i1, j = c.trace(), f.det()
+    i2 = (i1**2 - ddot(c, c)) / 2
+    return {
+        "eps": (g + g.T) / 2,
+        "E": (c - sp.eye(3)) / 2,
+        "C": c,
+        "I1": i1,
+        "I2": i2,
+        "I3": j**2,
+        "J": j,
+        "I1bar": i1 * j ** sp.Rational(-2, 3),
+        "I2bar": i2 * j ** sp.Rational(-4, 3),
+    }
+
+
+def matrix(numerators, denominator):
+    return sp.Matrix(3, 3, [sp.Rational(n, denominator) for n in numerators])
+
+
+# G, exact in f32: ordinary, large, small, compressed, turned by 90 degrees and stretched, at rest, inverted.
+STATES = [
+    matrix([7, -3, 2, 5, -9, 4, -1, 6, 11], 64),
+    matrix([96, 40, -32, -24, 64, 16, 48, -8, 20], 64),
+    matrix([9, -4, 3, 2, -7, 5, 1, -6, 8], 65536),
+    matrix([-26, 3, 1, -2, -20, 4, 5, 1, -14], 64),
+    matrix([-60, -80, 6, 72, -68, -4, 2, 3, 8], 64),
+    sp.zeros(3, 3),
+    matrix([-160, 3, 1, -2, 5, 4, 5, 1, -9], 64),
+]
+DIRECTION = matrix([3, -5, 2, 7, 1, -4, -2, 6, 5], 8)
+
+
+def materials(law):
+    """Two materials, of numbers that are exact in f32, within the declared ranges."""
+    for which in range(2):
+        values, position = {}, 0
+        for name, unit, (low, high), length in law.parameters:
+            row = []
+            for _ in range(length or 1):
+                position += 1
+                wanted = {
+                    "Pa": [sp.Integer(2) ** 20 * (8 + 3 * which + position) / 8],
+                    "1": [sp.Rational(5, 16), sp.Rational(31, 64)][which:],
+                }.get(unit, [sp.Integer(1 + which)])
+                # Nothing usual allowed: near the lower end, in eighths of the range or of one.
+                step = min(high - low, sp.Integer(1)) / 8
+                fallback = sp.Rational(*Fraction(float(low + step * (2 + which + position % 3))).as_integer_ratio())
+                row.append(next((w for w in wanted if low <= w <= high), fallback))
+            values[name] = row if length else row[0]
+        yield values
+
+
+def decimal(x, scale):
+    """25 digits; an exact zero as 0, also where logarithms cancel."""
+    x = sp.sympify(x).evalf(45)
+    return "0" if abs(x) <= sp.Float("1e-33", 45) * scale else str(sp.Float(x, 25))
+
+
+def exact(x):
+    """A dyadic rational in decimal digits, all of them."""
+    return str(sp.Float(x, 40).n(40)).rstrip("0").rstrip(".") if sp.Rational(x).q != 1 else str(sp.Rational(x).p)
+
+
+def values(law, parameters, g):
+    """W, P, dP and the Cauchy stress at one state, or None outside the domain."""
+    if not law.inside(strain(g), parameters):
+        return None
+    p, dp = [], []
+    rest = law.energy(strain(sp.zeros(3, 3)), parameters)
+    for k in range(9):
+        line = g + H * DIRECTION
+        line[k] += S
+        w = law.energy(strain(line), parameters)
+        first = sp.diff(w, S)
+        p.append(first.subs({S: 0, H: 0}).evalf(45))
+        dp.append(sp.diff(first, H).subs({S: 0, H: 0}).evalf(45))
+    f = sp.eye(3) + g
+    w = sp.sympify(law.energy(strain(g), parameters) - rest).evalf(45)
+    cauchy = [sum(p[3 * i + m] * f[k, m] for m in range(3)) / f.det() for i in range(3) for k in range(3)]
+    scale = max([abs(x) for x in dp])
+    components = [x for v in parameters.values() for x in (v if isinstance(v, list) else [v])]
+    return {
+        "parameters": [exact(x) for x in components],
+        "G": [exact(x) for x in g],
+        "dG": [exact(x) for x in DIRECTION],
+        "W": decimal(w, scale),
+        "P": [decimal(x, scale) for x in p],
+        "dP": [decimal(x, scale) for x in dp],
+        "cauchy": [decimal(x, scale) for x in cauchy],
+    }
+
+
+def main(arguments):
+    check = "--check" in arguments
+    names = [a for a in arguments if not a.startswith("-")]
+    laws = [ROOT / "laws" / f"{n}.rs" for n in names] or sorted((ROOT / "laws").glob("*.rs"))
+    folder = ROOT / "tests/reference/sympy"
+    folder.mkdir(parents=True, exist_ok=True)
+    different = []
+    for path in laws:
+        if not names and not (ROOT / "laws/derived" / f"{path.stem}.ir").exists():
+            print(f"{path.stem}: not reviewed, skipped")
+            continue
+        law = Law(path.read_text())
+        states = [values(law, m, g) for m in materials(law) for g in STATES]
+        states = [s for s in states if s is not None]
+        text = json.dumps({"law": path.stem, "states": states}, indent=1) + "\n"
+        target = folder / f"{path.stem}.json"
+        if check:
+            same = target.exists() and target.read_text() == text
+            print(f"{path.stem}: {len(states)} states, {'the same' if same else 'DIFFERENT from ' + str(target)}")
+            different += [] if same else [path.stem]
+        else:
+            target.write_text(text)
+            print(f"{path.stem}: {len(states)} states written")
+    return 1 if different else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

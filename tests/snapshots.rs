@@ -1,0 +1,89 @@
+//! Snapshots of what is generated, for review: each reviewed law's Rust module, the element, and the operation counts.
+//!
+//! The IR of a law has no snapshot here because `laws/derived/NAME.ir` is one: `derivations.rs` compares it byte by
+//! byte. Every printed module below also compiles and runs: the kernels crate includes the same text.
+
+use tensormass_kernels::laws;
+use tensormass_testing::codegen::derivation::Derivation;
+use tensormass_testing::codegen::element::{ElementKernels, kernels, tetrahedron_p1};
+use tensormass_testing::codegen::ir::{Input, ValidKernel};
+use tensormass_testing::codegen::{law, print::rust};
+use tensormass_testing::{derivation, root};
+
+/// Add + mul + div an element of the literature's best hand-written or staged kernels (Force, DForce with G recomputed).
+const REACHED: [(&str, u32, u32); 3] =
+    [("hooke", 121, 121), ("st_venant_kirchhoff", 200, 372), ("neo_hookean", 172, 326)];
+
+fn element() -> ElementKernels {
+    kernels(&tetrahedron_p1()).expect("the element is well-formed")
+}
+
+/// Force and DForce on one element: gather, point kernel, contract.
+fn element_counts(d: &Derivation) -> (u32, u32) {
+    let element = element();
+    let count = |k: &ValidKernel| k.count().arithmetic();
+    let around = count(&element.gradient) + count(&element.contract);
+    let dforce = d.kernel("dforce");
+    // dG is always gathered; G only where the law's tangent depends on it.
+    let gather = if dforce.reads(Input::DisplacementGradient) { count(&element.gradient) } else { 0 };
+    (around + count(d.kernel("force")), around + gather + count(dforce))
+}
+
+/// Compares a text with its committed snapshot.
+fn check(name: &str, text: &str) {
+    let mut settings = insta::Settings::clone_current();
+    settings.set_prepend_module_to_snapshot(false);
+    settings.set_omit_expression(true);
+    settings.bind(|| insta::assert_snapshot!(name, text));
+}
+
+#[test]
+fn rust_of_each_reviewed_law() {
+    let mut unreviewed = 0;
+    for entry in laws() {
+        let name = entry.info.name;
+        if !entry.info.reviewed {
+            unreviewed += 1;
+            continue;
+        }
+        let path = format!("laws/{name}.rs");
+        let text = std::fs::read_to_string(root().join(&path)).expect("the law file of a built law");
+        let law = law::parse(&path, &text).expect("the build accepted it");
+        let derivation = derivation(env!("TENSORMASS_GENERATED"), name);
+        check(&format!("law_{name}"), &rust::format(rust::law_module(&law, &derivation, true)).expect("Rust"));
+    }
+    eprintln!("skipped {unreviewed} unreviewed laws");
+}
+
+#[test]
+fn element_module() {
+    let element = element();
+    check("element_tetrahedron_p1", &rust::format(rust::element_module(&element)).expect("Rust"));
+    let ir = [&element.gradient, &element.contract, &element.node_gradients].map(|k| k.ir().to_text());
+    check("element_tetrahedron_p1_ir", &ir.join("\n"));
+}
+
+#[test]
+fn operation_counts() {
+    let mut table = String::from("add + mul + div (+ functions); an element is gather + point kernel + contract\n");
+    for entry in laws().iter().filter(|law| law.info.reviewed) {
+        let name = entry.info.name;
+        let derivation = derivation(env!("TENSORMASS_GENERATED"), name);
+        table += &format!("\n{name}\n");
+        for kernel in entry.info.operations {
+            let counted = derivation.kernel(kernel.kernel).count();
+            assert_eq!(kernel.arithmetic(), counted.arithmetic(), "{name}: metadata and kernel disagree");
+            table += &format!("  {:9} {:3} + {}\n", kernel.kernel, kernel.arithmetic(), kernel.functions);
+        }
+        let (force, dforce) = element_counts(&derivation);
+        table += &format!("  element   Force {force}, DForce {dforce}\n");
+        if let Some((_, best_force, best_dforce)) = REACHED.iter().find(|(n, ..)| *n == name) {
+            assert!(10 * force <= 11 * best_force, "{name}: Force takes {force} operations, {best_force} are known");
+            assert!(
+                10 * dforce <= 11 * best_dforce,
+                "{name}: DForce takes {dforce} operations, {best_dforce} are known"
+            );
+        }
+    }
+    check("operation_counts", &table);
+}

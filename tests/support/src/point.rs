@@ -1,0 +1,167 @@
+//! A law at a material point: its compiled kernels on a one-element batch, with the rounding bound of its derivation.
+
+use tensormass_codegen::derivation::Derivation;
+use tensormass_codegen::ir::Input;
+use tensormass_kernels::batch::{Batch, RestElement};
+use tensormass_kernels::{BatchKernels, LawEntry, Real};
+
+use crate::rounding::Rounded;
+use crate::tensor::{self, Matrix};
+
+/// The gradient of each node's interpolation function on the tetrahedron that [`Compiled`] uses.
+pub const NODE_GRADIENTS: [[f64; 3]; 4] = [[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// Compiled kernels of one material on the reference tetrahedron with volume 1. Its gradients are the unit vectors, so
+/// that displacements u_0 = 0, u_j = column j of G realise G exactly, and P is minus the forces, exactly; only the sign
+/// of a zero is lost in the element's sums.
+#[derive(Debug)]
+pub struct Compiled<R: Real> {
+    kernels: BatchKernels<R>,
+    constants: Vec<R>,
+}
+
+impl<R: Real> Compiled<R> {
+    /// Kernels with these constants, rounded to the working precision.
+    pub fn new(kernels: BatchKernels<R>, constants: &[f64]) -> Self {
+        Self { kernels, constants: constants.iter().map(|&c| R::from_f64(c)).collect() }
+    }
+
+    fn on_batch<T>(&self, f: impl FnOnce(&BatchKernels<R>, &Batch<R>) -> T) -> T {
+        let unit = |k: usize| R::from_f64(if k.is_multiple_of(4) { 1.0 } else { 0.0 });
+        let rest = [RestElement { shape_gradients: std::array::from_fn(unit), volume: R::from_f64(1.0) }];
+        let count = self.constants.len();
+        f(&self.kernels, &Batch { nodes: &[[0, 1, 2, 3]], rest: &rest, constants: &self.constants, stride: 0, count })
+    }
+
+    fn displacements(g: &[R; 9]) -> [[R; 3]; 4] {
+        std::array::from_fn(|n| std::array::from_fn(|i| if n == 0 { R::from_f64(0.0) } else { g[3 * i + n - 1] }))
+    }
+
+    fn zeros() -> [[[R; 3]; 4]; 1] {
+        [[[R::from_f64(0.0); 3]; 4]]
+    }
+
+    fn stress(forces: &[[R; 3]; 4]) -> [R; 9] {
+        std::array::from_fn(|k| -forces[1 + k % 3][k / 3])
+    }
+
+    /// W, and whether G is outside the domain.
+    pub fn energy(&self, g: &[R; 9]) -> (R, bool) {
+        let mut w = [R::from_f64(0.0)];
+        let outside = self.on_batch(|k, b| (k.energy)(b, &Self::displacements(g), &mut w));
+        (w[0], outside.is_some())
+    }
+
+    /// P, and whether G is outside the domain.
+    pub fn force(&self, g: &[R; 9]) -> ([R; 9], bool) {
+        let mut f = Self::zeros();
+        let outside = self.on_batch(|k, b| (k.force)(b, &Self::displacements(g), &mut f));
+        (Self::stress(&f[0]), outside.is_some())
+    }
+
+    /// dP in the direction dG.
+    pub fn dforce(&self, g: &[R; 9], dg: &[R; 9]) -> [R; 9] {
+        let mut f = Self::zeros();
+        self.on_batch(|k, b| (k.dforce)(b, &Self::displacements(g), &Self::displacements(dg), &mut f));
+        Self::stress(&f[0])
+    }
+
+    /// The tangent's diagonal for each of [`NODE_GRADIENTS`].
+    pub fn diagonal(&self, g: &[R; 9]) -> [[R; 3]; 4] {
+        let mut d = Self::zeros();
+        self.on_batch(|k, b| (k.diagonal)(b, &Self::displacements(g), &mut d));
+        d[0]
+    }
+
+    /// The Cauchy stress.
+    pub fn cauchy(&self, g: &[R; 9]) -> [R; 9] {
+        let mut s = [[R::from_f64(0.0); 9]];
+        self.on_batch(|k, b| (k.cauchy)(b, &Self::displacements(g), &mut s));
+        s[0]
+    }
+}
+
+/// A material point: values by the compiled f64 kernels, errors by interpreting the derivation.
+#[derive(Debug)]
+pub struct Point {
+    /// The law.
+    pub entry: &'static LawEntry,
+    /// Its derivation.
+    pub derivation: Derivation,
+    /// The material's parameters.
+    pub parameters: Vec<f64>,
+    /// Kernels in double precision.
+    pub double: Compiled<f64>,
+    /// Kernels in single precision.
+    pub single: Compiled<f32>,
+    constants: Vec<Rounded>,
+}
+
+impl Point {
+    /// A material of a law; `generated` is the folder of the generated code, `env!("TENSORMASS_GENERATED")`.
+    ///
+    /// # Panics
+    /// The law has no derivation.
+    pub fn new(generated: &str, entry: &'static LawEntry, parameters: Vec<f64>) -> Self {
+        let derivation = crate::derivation(generated, entry.info.name);
+        let values = entry.constants(&parameters);
+        let exact: Vec<Rounded> = parameters.iter().map(|&p| Rounded::exact(p)).collect();
+        let material = derivation.kernel("material").interpret(&[(Input::Parameters, exact.as_slice())]);
+        // In f32 the constants are rounded once more.
+        let bounds = material.expect("one value a parameter component").remove(0).into_iter();
+        let constants =
+            bounds.zip(&values).map(|(b, &v)| Rounded { value: v, error: b.error + v.abs() }).collect::<Vec<_>>();
+        let double = Compiled::new((entry.f64)(), &values);
+        let single = Compiled::new((entry.f32)(), &values);
+        Self { entry, derivation, parameters, double, single, constants }
+    }
+
+    fn bounds(&self, kernel: &str, inputs: &[(Input, &[Rounded])]) -> Vec<Vec<Rounded>> {
+        let mut all = vec![(Input::Constants, self.constants.as_slice())];
+        all.extend_from_slice(inputs);
+        self.derivation.kernel(kernel).interpret(&all).expect("the inputs of a point kernel")
+    }
+
+    fn bounded<const N: usize>(&self, values: [f64; N], bounds: &[Rounded]) -> [Rounded; N] {
+        std::array::from_fn(|k| Rounded { value: values[k], error: bounds[k].error })
+    }
+
+    /// W.
+    pub fn energy(&self, g: &Matrix) -> Rounded {
+        let bounds = self.bounds("energy", &[(Input::DisplacementGradient, g)]);
+        self.bounded([self.double.energy(&tensor::values(g)).0], &bounds[0])[0]
+    }
+
+    /// P.
+    pub fn force(&self, g: &Matrix) -> Matrix {
+        let bounds = self.bounds("force", &[(Input::DisplacementGradient, g)]);
+        self.bounded(self.double.force(&tensor::values(g)).0, &bounds[0])
+    }
+
+    /// dP.
+    pub fn dforce(&self, g: &Matrix, dg: &Matrix) -> Matrix {
+        let bounds = self.bounds("dforce", &[(Input::DisplacementGradient, g), (Input::GradientIncrement, dg)]);
+        self.bounded(self.double.dforce(&tensor::values(g), &tensor::values(dg)), &bounds[0])
+    }
+
+    /// The diagonal for each of [`NODE_GRADIENTS`].
+    pub fn diagonal(&self, g: &Matrix) -> [[Rounded; 3]; 4] {
+        let values = self.double.diagonal(&tensor::values(g));
+        std::array::from_fn(|n| {
+            let node = NODE_GRADIENTS[n].map(Rounded::exact);
+            let bounds = self.bounds("diagonal", &[(Input::DisplacementGradient, g), (Input::NodeGradient, &node)]);
+            self.bounded(values[n], &bounds[0])
+        })
+    }
+
+    /// The Cauchy stress.
+    pub fn cauchy(&self, g: &Matrix) -> Matrix {
+        let bounds = self.bounds("cauchy", &[(Input::DisplacementGradient, g)]);
+        self.bounded(self.double.cauchy(&tensor::values(g)), &bounds[0])
+    }
+
+    /// Left minus right side of the domain's inequality, where the law has one.
+    pub fn margin(&self, g: &Matrix) -> Option<Rounded> {
+        self.bounds("energy", &[(Input::DisplacementGradient, g)]).get(1).map(|margin| margin[0])
+    }
+}
