@@ -71,7 +71,9 @@ impl SceneArguments {
 /// Runs a scene.
 pub fn call(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.device == Device::Gpu {
-        return Err(Failure::bad_input("--device gpu: this version computes on the CPU only; use --device cpu or auto"));
+        return Err(Failure::bad_input(
+            "--device gpu: this version computes on the CPU only; use --device cpu or auto",
+        ));
     }
     let scene = arguments.scene.load()?;
     let out = arguments.out.clone().unwrap_or_else(|| default_out(&scene));
@@ -93,7 +95,9 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
     }
     match outcome.ending {
         Ending::Done => Ok(()),
-        Ending::Failed(e) => Err(Failure::Simulation(format!("{e}\nwhat was computed until then is in {}", out.display()))),
+        Ending::Failed(e) => {
+            Err(Failure::Simulation(format!("{e}\nwhat was computed until then is in {}", out.display())))
+        }
         Ending::Interrupted => Err(Failure::Interrupted(format!("interrupted; the results are in {}", out.display()))),
     }
 }
