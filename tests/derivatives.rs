@@ -57,7 +57,7 @@ impl Case {
 /// Central differences with steps h, h/2, h/4, h/8, extrapolated (Romberg): the error is O(h^8), and the difference to
 /// the extrapolation one order lower bounds it.
 fn derivative<const N: usize>(f: impl Fn(f64) -> [Rounded; N]) -> [(Rounded, f64); N] {
-    let steps = [1.0 / 32.0, 1.0 / 64.0, 1.0 / 128.0, 1.0 / 256.0];
+    let steps = [1.0 / 128.0, 1.0 / 256.0, 1.0 / 512.0, 1.0 / 1024.0];
     let samples = steps.map(|h| (f(h), f(-h)));
     std::array::from_fn(|k| {
         let mut column: Vec<Rounded> =
@@ -244,7 +244,7 @@ fn check(property: fn(&mut Case) -> Vec<Comparison>) {
         for seed in 0..STATES {
             let mut rng = Rng::new(seed);
             let point = Point::new(env!("TENSORMASS_GENERATED"), entry, rng.parameters(entry.info));
-            let g = rng.gradient(STRETCHES.0, STRETCHES.1);
+            let g = point.state(&mut rng, STRETCHES);
             let mut case = Case { point, rng, g };
             for c in property(&mut case) {
                 let context = format!("{name}, seed {seed}, parameters {:?}, G {g:?}", case.point.parameters);

@@ -26,7 +26,7 @@ fn check(law: &'static LawEntry, seed: u64, stretch: (f64, f64)) {
     let energy = ORACLE.iter().find(|(n, _)| *n == name).expect("every law has an oracle").1;
     let mut rng = Rng::new(seed);
     let point = Point::new(env!("TENSORMASS_GENERATED"), law, rng.parameters(law.info));
-    let mut g = rng.gradient(stretch.0, stretch.1);
+    let mut g = point.state(&mut rng, stretch);
     if law.info.domain.is_none() && seed % 4 == 3 {
         // Everywhere is everywhere: inverted states too.
         g[2] = -g[2];

@@ -5,6 +5,7 @@ use tensormass_codegen::ir::Input;
 use tensormass_kernels::batch::{Batch, RestElement};
 use tensormass_kernels::{BatchKernels, LawEntry, Real};
 
+use crate::random::Rng;
 use crate::rounding::Rounded;
 use crate::tensor::{self, Matrix};
 
@@ -114,6 +115,19 @@ impl Point {
         let double = Compiled::new((entry.f64)(), &values);
         let single = Compiled::new((entry.f32)(), &values);
         Self { entry, derivation, parameters, double, single, constants }
+    }
+
+    /// G at a random state (see [`Rng::gradient`]) well inside the law's domain: where states of this stretch may be
+    /// outside, half as far from rest as those that are not.
+    ///
+    /// # Panics
+    /// The law reports every state as outside.
+    pub fn state(&self, rng: &mut Rng, (low, high): (f64, f64)) -> [f64; 9] {
+        let mut draw = |s: f64| rng.gradient(low.powf(s), high.powf(s));
+        let mut inside = |s: &f64| (0..16).all(|_| !self.double.force(&draw(*s)).1);
+        let share = (0..32).map(|k| 0.8f64.powi(k)).find(&mut inside);
+        let share = share.unwrap_or_else(|| panic!("{}: no state is inside the domain", self.entry.info.name));
+        draw(if share < 1.0 { share / 2.0 } else { share })
     }
 
     fn bounds(&self, kernel: &str, inputs: &[(Input, &[Rounded])]) -> Vec<Vec<Rounded>> {
