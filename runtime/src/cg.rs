@@ -86,12 +86,7 @@ pub struct ConjugateGradient<B: Backend> {
 impl<B: Backend> ConjugateGradient<B> {
     /// Work vectors for a body.
     pub fn new(backend: &B) -> Self {
-        Self {
-            r: backend.zeros(),
-            z: backend.zeros(),
-            d: backend.zeros(),
-            q: backend.zeros(),
-        }
+        Self { r: backend.zeros(), z: backend.zeros(), d: backend.zeros(), q: backend.zeros() }
     }
 
     /// Solves A x = b for the free components of x; its constrained components are given and kept.

@@ -56,7 +56,11 @@ fn check(cells: [u32; 3]) {
     let outcome = done(&scene(BEAM, &[format!("mesh.beam.cells={cells:?}")]));
     let (nodes, area) = (probe(&outcome, "nodes"), -probe(&outcome, "work"));
     let products = &outcome.summary["solver"]["tangent_products"];
-    println!("{cells:?}: nodes {:.2e}, area {:.2e}, {products} products", relative(nodes, wanted), relative(area, wanted));
+    println!(
+        "{cells:?}: nodes {:.2e}, area {:.2e}, {products} products",
+        relative(nodes, wanted),
+        relative(area, wanted)
+    );
     assert!(relative(area, wanted) <= 1e-8, "{cells:?}: the tip moves {area}, wanted {wanted}");
     // The tip stays plane but for the bending of a cross-section: strain 6e-5 at the tip, over a height of 1 in 10.
     assert!(relative(nodes, wanted) <= 1e-5, "{cells:?}: the tip's nodes move {nodes}, wanted {wanted}");

@@ -74,7 +74,12 @@ fn free_ends_after_a_slow_ramp() {
 
 #[test]
 fn clamped_ends_in_64_bits() {
-    check(&Case { ends: "clamped_ends", poisson: &["0.3", "0.45"], set: &[STATIC, F64, TIGHT, CLAMPED], tolerance: 1e-9 });
+    check(&Case {
+        ends: "clamped_ends",
+        poisson: &["0.3", "0.45"],
+        set: &[STATIC, F64, TIGHT, CLAMPED],
+        tolerance: 1e-9,
+    });
 }
 
 #[test]
