@@ -1,0 +1,245 @@
+//! Several laws and materials in one body, and what must not change a bit: threads, units, place, a second run.
+
+mod support;
+
+use support::{Random, body, outcome, parameters, parameters_text, scene, system};
+use tensormass_runtime::backend::{Backend, ForceField};
+use tensormass_runtime::build::{Model, build};
+use tensormass_runtime::laws;
+use tensormass_runtime::mesh::beam;
+use tensormass_runtime::scene::Scene;
+use tensormass_runtime::simulate::Ending;
+
+/// Materials for slabs along x, by law and Young's modulus; other parameters are those of any law.
+fn materials(slabs: &[(&str, f64)], length: f64, density: f64) -> String {
+    let count = slabs.len() as f64;
+    let one = |(i, (law, stiffness)): (usize, &(&str, f64))| {
+        let entry = tensormass_runtime::law(law).expect("a law of this build");
+        let text = parameters_text(entry).replace("1000000.0", &format!("{stiffness:?}"));
+        let (from, to) = (length * i as f64 / count, length * (i + 1) as f64 / count);
+        format!(
+            "[[material]]\nlaw = \"{law}\"\ndensity = {density:?}\nelements = \"x > {from:?} && x < {to:?}\"\n\
+             parameters = {text}\n"
+        )
+    };
+    slabs.iter().enumerate().map(one).collect()
+}
+
+/// A beam of all laws, clamped, that swings under a sudden traction.
+struct Swing {
+    /// Factors of two of length and of stress.
+    length: f64,
+    stress: f64,
+    origin: [f64; 3],
+    cells: [u32; 3],
+    integrator: &'static str,
+    precision: &'static str,
+    threads: u32,
+    steps: u32,
+}
+
+const SWING: Swing = Swing {
+    length: 1.0,
+    stress: 1.0,
+    origin: [0.0; 3],
+    cells: [8, 2, 2],
+    integrator: "implicit-euler",
+    precision: "f64",
+    threads: 1,
+    steps: 5,
+};
+
+impl Swing {
+    fn scene(&self) -> Scene {
+        let Swing { length, stress, origin, cells, integrator, precision, threads, steps } = self;
+        let slabs: Vec<(&str, f64)> = laws().iter().map(|l| (l.info.name, 1e6 * stress)).collect();
+        // Selections by x count from the end.
+        let materials =
+            materials(&slabs, 4.0 * length, 1000.0).replace("x >", "x - xmin >").replace("x <", "x - xmin <");
+        let (size, origin) = ([4.0 * length, *length, *length], origin.map(|x| x * length));
+        let time = length / stress.sqrt();
+        let step = time * if *integrator == "implicit-euler" { 0.01 } else { 1e-3 };
+        let text = format!(
+            r#"
+[mesh]
+beam = {{ size = {size:?}, cells = {cells:?}, origin = {origin:?} }}
+{materials}
+[[boundary]]
+nodes = "near(x, xmin)"
+fix = ["x", "y", "z"]
+[[load]]
+kind = "traction"
+faces = "near(x, xmax)"
+value = [{:?}, {:?}, {:?}]
+[solver]
+integrator = "{integrator}"
+precision = "{precision}"
+threads = {threads}
+step = {step:?}
+duration = {:?}
+[[probe]]
+name = "tip"
+kind = "displacement"
+nodes = "near(x, xmax)"
+component = "y"
+[[probe]]
+name = "largest"
+kind = "displacement"
+nodes = "all"
+component = "magnitude"
+statistic = "max"
+[[probe]]
+name = "elastic"
+kind = "energy"
+part = "elastic"
+[[probe]]
+name = "kinetic"
+kind = "energy"
+part = "kinetic"
+[[probe]]
+name = "stress"
+kind = "stress"
+component = "von_mises"
+"#,
+            1e3 * stress,
+            2e3 * stress,
+            -3e3 * stress,
+            f64::from(*steps) * step,
+        );
+        scene::<&str>(&text, &[])
+    }
+
+    /// The probes in the units of factor 1, as bits.
+    fn bits(&self) -> Vec<(String, u64)> {
+        let outcome = outcome(&self.scene());
+        assert_eq!(outcome.ending, Ending::Done);
+        let energy = self.length.powi(3) * self.stress;
+        let unit = |unit: &str| match unit {
+            "m" => self.length,
+            "J" => energy,
+            _ => self.stress,
+        };
+        assert!(outcome.probes.iter().all(|(_, _, value)| value.is_finite() && *value != 0.0), "{:?}", outcome.probes);
+        outcome.probes.iter().map(|(name, u, value)| (name.clone(), (value / unit(u)).to_bits())).collect()
+    }
+}
+
+/// Two runs that must agree in every bit.
+fn check(what: &str, one: &Swing, other: &Swing) {
+    for integrator in ["implicit-euler", "central-difference", "semi-implicit-euler"] {
+        for precision in ["f64", "f32"] {
+            let (a, b) =
+                (Swing { integrator, precision, ..*one }.bits(), Swing { integrator, precision, ..*other }.bits());
+            assert_eq!(a, b, "{what}: {integrator}, {precision}");
+        }
+    }
+}
+
+/// More elements than two tasks take, and more nodes than one block of a sum.
+#[test]
+fn threads_change_nothing() {
+    let cells = [16, 16, 16];
+    for threads in [2, 3] {
+        check("threads", &Swing { cells, steps: 2, ..SWING }, &Swing { cells, steps: 2, threads, ..SWING });
+    }
+}
+
+#[test]
+fn reruns_change_nothing() {
+    check("a rerun", &SWING, &SWING);
+}
+
+#[test]
+fn units_change_nothing() {
+    // Stress by even powers, so that time changes by powers of two as well.
+    for (length, stress) in [(-10, 0), (10, 0), (0, 8), (0, -8), (-3, 4)] {
+        let (length, stress) = (2.0_f64.powi(length), 2.0_f64.powi(stress));
+        check("units", &SWING, &Swing { length, stress, ..SWING });
+    }
+}
+
+/// Nodes at quarters and halves of the beam are representable at these places.
+#[test]
+fn place_changes_nothing() {
+    for origin in [[8.0, -16.0, 4.0], [-1024.0, 0.5, 65536.0]] {
+        check("place", &SWING, &Swing { origin, ..SWING });
+    }
+}
+
+fn forces(model: &Model, u: &[[f64; 3]]) -> (Vec<[f64; 3]>, Vec<f64>, Vec<[f64; 9]>) {
+    let scaled: Vec<[f64; 3]> = u.iter().map(|u| u.map(|x| x / model.scale.length)).collect();
+    let mut system = system::<f64>(model.body.clone());
+    let mut f = system.backend.zeros();
+    system.field.add_force(&system.backend, &scaled, &mut f).unwrap_or_else(|e| panic!("{e}"));
+    let (force, energy, stress) = (model.scale.force(), model.scale.energy(), model.scale.stress);
+    let energies = system.field.element_energies(&scaled).unwrap_or_else(|e| panic!("{e}"));
+    (
+        f.iter().map(|f| f.map(|x| x * force)).collect(),
+        energies.iter().map(|w| w * energy).collect(),
+        system.field.cauchy(&scaled).iter().map(|s| s.map(|x| x * stress)).collect(),
+    )
+}
+
+/// Slabs of different laws, or of one law with different stiffness: each element has, to the bit, what it has in a body
+/// that is made of its material alone (units change by powers of two only), and each node the sum of that.
+fn check_slabs(slabs: &[(&str, f64)]) {
+    let text = |slabs: &[(&str, f64)]| {
+        let (materials, solver) =
+            (materials(slabs, 4.0, 1000.0), "integrator = \"implicit-euler\"\nstep = 1\nduration = 1");
+        format!("{materials}\n[mesh]\nbeam = {{ size = [4, 1, 1], cells = [8, 2, 2] }}\n[solver]\n{solver}\n")
+    };
+    let of = |slabs: &[(&str, f64)]| build(&scene::<&str>(&text(slabs), &[])).unwrap_or_else(|e| panic!("{e}"));
+    let all = of(slabs);
+    let seed = 5;
+    let mut random = Random(seed);
+    let u: Vec<[f64; 3]> = all.mesh.nodes().iter().map(|_| random.vector(0.04)).collect();
+    let (f, energies, stresses) = forces(&all, &u);
+    let mut sum = vec![[0.0; 3]; f.len()];
+    let mut largest = 0.0_f64;
+    for (i, slab) in slabs.iter().enumerate() {
+        let alone = of(&[*slab]);
+        let (_, own_energies, own_stresses) = forces(&alone, &u);
+        for e in all.mesh.elements() {
+            let corners = all.mesh.corners(e);
+            let x = corners.iter().map(|p| p[0]).sum::<f64>() / 4.0;
+            if (x / 4.0 * slabs.len() as f64) as usize == i {
+                let name = format!("{slabs:?}, seed {seed}, element {e:?} of slab {i}");
+                assert_eq!(energies[e.index()].to_bits(), own_energies[e.index()].to_bits(), "{name}");
+                assert_eq!(stresses[e.index()].map(f64::to_bits), own_stresses[e.index()].map(f64::to_bits), "{name}");
+            }
+        }
+        // The forces of this slab: a body of its elements' batch only.
+        let entry = tensormass_runtime::law(slab.0).expect("a law");
+        let mesh = beam([4.0, 1.0, 1.0], [8, 2, 2], [0.0; 3]).expect("a beam");
+        let mut own = parameters(entry);
+        own.iter_mut().filter(|p| **p == 1e6).for_each(|p| *p = slab.1);
+        let mut body = body(&mesh, entry, &own, &[]);
+        let place = |e: &u32| {
+            let corners = mesh.corners(tensormass_runtime::mesh::ElementId(*e));
+            (corners.iter().map(|p| p[0]).sum::<f64>() / 16.0 * slabs.len() as f64) as usize
+        };
+        body.batches[0].elements.retain(|e| place(e) == i);
+        let mut system = system::<f64>(body);
+        system.field.add_force(&system.backend, &u, &mut sum).unwrap_or_else(|e| panic!("{e}"));
+        largest = largest.max(system.backend.max_abs(&sum));
+    }
+    for (n, (f, s)) in f.iter().zip(&sum).enumerate() {
+        // The order of at most 24 sums differs.
+        let off = (0..3).map(|c| (f[c] - s[c]).abs()).fold(0.0, f64::max);
+        assert!(off <= 24.0 * 4.0 * f64::EPSILON * largest, "{slabs:?}, seed {seed}, node {n}: {f:?} against {s:?}");
+    }
+}
+
+#[test]
+fn slabs_of_different_laws() {
+    let slabs: Vec<(&str, f64)> = laws().iter().map(|l| (l.info.name, 1e6)).collect();
+    assert!(slabs.len() > 1, "one law makes no mixture");
+    check_slabs(&slabs);
+}
+
+#[test]
+fn slabs_of_one_law() {
+    for law in laws() {
+        check_slabs(&[(law.info.name, 1e6), (law.info.name, 7e6)]);
+    }
+}

@@ -1,0 +1,164 @@
+//! What the physics tests share: reference cases, scenes run in memory, bodies for any law, a random sequence.
+#![allow(dead_code)] // every test links its own copy and uses a part of it
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use tensormass_runtime::LawEntry;
+use tensormass_runtime::body::{Body, Constraint, LawBatch, lump};
+use tensormass_runtime::cpu::{CpuBackend, CpuField, Precision};
+use tensormass_runtime::history::History;
+use tensormass_runtime::mesh::TetMesh;
+use tensormass_runtime::scene::{self, Override, Scene};
+use tensormass_runtime::simulate::{Ending, Outcome, Silent, run};
+use tensormass_runtime::system::System;
+
+/// A system on the CPU.
+pub type Cpu<R> = System<CpuBackend<R>, CpuField<R>>;
+
+/// A file of the repository.
+pub fn repository(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
+}
+
+/// A file of tests/reference.
+pub fn reference(file: &str) -> Value {
+    let path = repository("tests/reference").join(file);
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    serde_json::from_str(&text).expect("reference files are JSON")
+}
+
+/// The case of this id in tests/reference/cases.json.
+pub fn case(id: &str) -> Value {
+    let cases = reference("cases.json");
+    let all = cases["cases"].as_array().expect("a list of cases");
+    all.iter().find(|c| c["id"] == id).unwrap_or_else(|| panic!("there is no case {id}")).clone()
+}
+
+/// A number of a reference case.
+pub fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
+}
+
+/// Several numbers of a reference case.
+pub fn numbers<const N: usize>(value: &Value) -> [f64; N] {
+    std::array::from_fn(|i| number(&value[i]))
+}
+
+/// Overrides as `--set` takes them.
+pub fn overrides<S: AsRef<str>>(set: &[S]) -> Vec<Override> {
+    set.iter().map(|s| Override::parse(s.as_ref()).unwrap_or_else(|e| panic!("{e}"))).collect()
+}
+
+/// A scene from text.
+pub fn scene<S: AsRef<str>>(text: &str, set: &[S]) -> Scene {
+    scene::parse(text, "test.toml", &overrides(set)).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Runs a scene in memory to whatever end.
+pub fn outcome(scene: &Scene) -> Outcome {
+    run(scene, None, &mut Silent).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Runs a scene in memory to its end.
+pub fn done(scene: &Scene) -> Outcome {
+    let outcome = outcome(scene);
+    assert_eq!(outcome.ending, Ending::Done, "{}", outcome.summary["error"]);
+    outcome
+}
+
+/// The last value of a probe.
+pub fn probe(outcome: &Outcome, name: &str) -> f64 {
+    let found = outcome.probes.iter().find(|(n, _, _)| n == name);
+    found.unwrap_or_else(|| panic!("there is no probe {name}")).2
+}
+
+/// |value / wanted - 1|.
+pub fn relative(value: f64, wanted: f64) -> f64 {
+    (value / wanted - 1.0).abs()
+}
+
+/// Numbers in [-1, 1) from a seed.
+pub struct Random(pub u64);
+
+impl Random {
+    /// The next number.
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    /// The next three numbers, times a factor.
+    pub fn vector(&mut self, factor: f64) -> [f64; 3] {
+        std::array::from_fn(|_| factor * self.next())
+    }
+}
+
+/// Parameters for any law: its defaults, or else 1 MPa for a stress, .3 for what may be .3, the middle of the range for
+/// the rest; equal components of one unit vector for a direction.
+pub fn parameters(law: &LawEntry) -> Vec<f64> {
+    let one = |p: &tensormass_runtime::ParameterInfo| {
+        let wish = match p.dimensions {
+            [0, 1, 0] => 1e6,
+            _ if p.len == 3 => 1.0 / 3.0_f64.sqrt(),
+            _ => 0.3,
+        };
+        let (low, high) = p.range;
+        vec![if (low..=high).contains(&wish) { wish } else { 0.5 * (low + high) }; p.len]
+    };
+    law.info.parameters.iter().flat_map(|p| p.default.map_or_else(|| one(p), <[f64]>::to_vec)).collect()
+}
+
+/// The parameters of [`parameters`] as a TOML table.
+pub fn parameters_text(law: &LawEntry) -> String {
+    let values = parameters(law);
+    let mut rest = values.as_slice();
+    let mut items = Vec::new();
+    for p in law.info.parameters {
+        let (now, later) = rest.split_at(p.len);
+        rest = later;
+        items.push(if p.len == 1 { format!("{} = {:?}", p.name, now[0]) } else { format!("{} = {now:?}", p.name) });
+    }
+    format!("{{ {} }}", items.join(", "))
+}
+
+/// A body of one law in SI units (1000 kg/m3); `imposed` are (node, component, displacement), ascending.
+pub fn body(mesh: &TetMesh, law: &'static LawEntry, parameters: &[f64], imposed: &[(u32, u8, f64)]) -> Body {
+    let density = 1000.0;
+    let elements: Vec<[u32; 4]> = mesh.tets().iter().map(|t| t.map(|n| n.0)).collect();
+    let gradients: Vec<_> = mesh.elements().map(|e| mesh.shape_gradients(e)).collect();
+    let rest = gradients.iter().map(|g| {
+        let rows = g.gradients.as_flattened();
+        tensormass_kernels::batch::RestElement { shape_gradients: std::array::from_fn(|k| rows[k]), volume: g.volume }
+    });
+    let element_masses: Vec<f64> = gradients.iter().map(|g| g.volume * density).collect();
+    let [low, high] = mesh.bounding_box();
+    let constraint = |(motion, &(node, component, _)): (usize, &(u32, u8, f64))| Constraint { node, component, motion };
+    Body {
+        rest: rest.collect(),
+        batches: vec![LawBatch {
+            law,
+            elements: (0..elements.len() as u32).collect(),
+            constants: law.constants(parameters),
+            per_element: false,
+        }],
+        masses: lump(mesh.nodes().len(), &elements, &element_masses),
+        elements,
+        element_masses,
+        constraints: imposed.iter().enumerate().map(constraint).collect(),
+        motions: imposed.iter().map(|&(_, _, value)| History::constant(value)).collect(),
+        loads: vec![],
+        mass_damping: 0.0,
+        diameter: (0..3).map(|i| (high[i] - low[i]).powi(2)).sum::<f64>().sqrt(),
+        volume: mesh.total_volume(),
+    }
+}
+
+/// A body on the CPU.
+pub fn system<R: Precision>(body: Body) -> Cpu<R> {
+    let constrained = body.constraints.iter().map(|c| (c.node, c.component)).collect();
+    System::new(CpuBackend::new(body.masses.len(), constrained), CpuField::new(&body), body)
+}
