@@ -125,7 +125,7 @@ fn bad_input_ends_with_2_a_place_and_a_remedy() {
     let cases = [
         (
             &["--set", "solver.integrater=static"][..],
-            "error: --set solver.integrater=static: `solver` has no key `integrater`\n  = help: did you mean `integrator`?",
+            "error: --set solver.integrater=static: unknown key `integrater` in `solver`\n  = help: did you mean `integrator`?",
         ),
         (
             &["--set", "material.0.law=hook"],
