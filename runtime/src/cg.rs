@@ -129,8 +129,7 @@ impl<B: Backend> ConjugateGradient<B> {
         for iteration in 1..=limits.max_iterations {
             operator.apply(backend, field, d, q);
             let curvature = backend.dot(d, q);
-            // Also true where the product is not a number.
-            if !(curvature > 0.0) {
+            if curvature <= 0.0 || curvature.is_nan() {
                 return report(CgOutcome::NegativeCurvature, iteration, rho);
             }
             let alpha = rho / curvature;

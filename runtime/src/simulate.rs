@@ -356,11 +356,10 @@ impl<'a, R: Precision> Run<'a, R> {
     fn failure(&self, e: &LeftDomain) -> Value {
         let nodes = self.system.body.elements[e.element as usize].map(|n| n as usize);
         let u = self.in_si(&self.state.u, self.model.scale.length);
-        let material = self.model.materials.iter().find(|m| m.law.info.name == e.law);
         json!({
             "error": e.to_string(),
             "law": e.law,
-            "parameters": material.map(|m| &m.parameters),
+            "parameters": self.model.assignment.parameters(e.element),
             "element": e.element,
             "time_s": self.state.time * self.model.scale.time,
             "rest_positions_m": nodes.map(|n| self.model.mesh.nodes()[n]),

@@ -28,6 +28,7 @@ pub struct MaterialReport {
     pub parameters: Vec<f64>,
 }
 
+#[derive(Debug)]
 struct Entry {
     report: MaterialReport,
     values: Values,
@@ -35,6 +36,7 @@ struct Entry {
 }
 
 /// Every element's material.
+#[derive(Debug)]
 pub struct Assignment {
     entries: Vec<Entry>,
     of_element: Vec<usize>,
@@ -121,6 +123,11 @@ impl Assignment {
     /// Each element's density (kg/m^3).
     pub fn densities(&self) -> impl Iterator<Item = f64> {
         self.of_element.iter().map(|&m| self.entries[m].report.density)
+    }
+
+    /// An element's parameters, in its law's units.
+    pub fn parameters(&self, element: u32) -> &[f64] {
+        self.entries[self.of_element[element as usize]].values.row(element)
     }
 
     /// What each material is.

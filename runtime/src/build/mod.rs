@@ -45,6 +45,8 @@ pub struct Model {
     pub recorder: Recorder,
     /// What each material is.
     pub materials: Vec<MaterialReport>,
+    /// Which of them each element has.
+    pub(crate) assignment: material::Assignment,
     /// Initial velocity, scaled.
     pub velocity: [f64; 3],
     /// What is allowed but looks wrong.
@@ -100,7 +102,7 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
         diameter: diagonal / scale.length,
         volume: mesh.total_volume() / scale.length.powi(3),
     };
-    Ok(Model { materials: assignment.reports(), mesh, body, scale, recorder, velocity, warnings })
+    Ok(Model { materials: assignment.reports(), assignment, mesh, body, scale, recorder, velocity, warnings })
 }
 
 fn load_mesh(scene: &Scene, warnings: &mut Vec<String>) -> Result<TetMesh, BuildError> {

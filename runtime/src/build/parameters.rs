@@ -66,7 +66,7 @@ fn column(
                 return Err(SceneError::at(
                     scene.locate(&format!("{base}.parameters")),
                     format!("law `{}` needs the parameter `{}`", law.info.name, info.name),
-                    format!("write {} = ..: {} ({})", info.name, info.docs.trim(), info.unit),
+                    format!("write {} = ..: {}{}", info.name, info.docs.trim().trim_end_matches('.'), unit(info)),
                 ));
             }
         },
@@ -105,12 +105,17 @@ fn column(
             return Err(SceneError::at(
                 scene.locate(&path),
                 format!("`{}`{which} is {x}, outside the range of law `{}`", info.name, law.info.name),
-                format!("choose a value from {low:?} to {high:?} ({})", info.unit),
+                format!("choose a value from {low:?} to {high:?}{}", unit(info)),
             ));
         }
     }
     // One element's mesh and one value for it are the same thing; two rows tell a reader of `columns` that they vary.
     Ok(values)
+}
+
+/// The unit in brackets, if there is one.
+fn unit(info: &ParameterInfo) -> String {
+    if info.unit == "1" { String::new() } else { format!(" ({})", info.unit) }
 }
 
 fn numbers(value: &ParameterValue) -> Vec<f64> {
