@@ -19,7 +19,7 @@ pub fn print(text: &str) -> Result<(), Failure> {
 /// Writes data as indented JSON to the standard output.
 ///
 /// # Errors
-/// See [`print`].
+/// See [`print()`].
 pub fn print_json(value: &serde_json::Value) -> Result<(), Failure> {
     print(&format!("{value:#}\n"))
 }
