@@ -32,7 +32,9 @@ pub enum ElementError {
     #[error("element `{0}`: its interpolation functions do not sum to 1")]
     Unity(&'static str),
     /// The gradients are not constant, or there are several quadrature points.
-    #[error("element `{0}`: only elements with constant gradients and one quadrature point are supported by this version")]
+    #[error(
+        "element `{0}`: only elements with constant gradients and one quadrature point are supported by this version"
+    )]
     NotConstant(&'static str),
     /// A printed kernel breaks a rule: a defect of the generator.
     #[error(transparent)]
@@ -203,7 +205,8 @@ fn contract(n: u32) -> KernelIr {
 
 fn node_gradients(n: u32) -> KernelIr {
     let mut b = Builder::new();
-    let others: Vec<ValueId> = (1..n).flat_map(|j| (0..3).map(move |k| (j, k))).map(|(j, k)| shape(&mut b, j, k)).collect();
+    let others: Vec<ValueId> =
+        (1..n).flat_map(|j| (0..3).map(move |k| (j, k))).map(|(j, k)| shape(&mut b, j, k)).collect();
     let first: Vec<ValueId> = (0..3)
         .map(|k| {
             let mut sum = others[k];

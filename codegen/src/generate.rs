@@ -117,9 +117,7 @@ fn generate_from(laws: &Path, out: &Path, derive: bool) -> Result<Vec<GeneratedL
         committed
             .iter()
             .zip(&parsed)
-            .map(|(c, (_, law))| {
-                c.clone().map_err(|state| GenerateError::Derivation { law: law.name.clone(), state })
-            })
+            .map(|(c, (_, law))| c.clone().map_err(|state| GenerateError::Derivation { law: law.name.clone(), state }))
             .collect::<Result<_, _>>()?
     };
     let mut generated = Vec::new();

@@ -184,7 +184,8 @@ impl<'a, N: FnMut(&Expr) -> Expr> Lowering<'a, N> {
             (Expr::Number(q), Some(n)) => m.coefficient.number *= q.pow(n),
             _ if self.is_constant(e) => {
                 let power = if r.is_one() { e.clone() } else { e.clone().pow(r) };
-                m.coefficient = m.coefficient.clone().times(&Coefficient { number: Rational::one(), constants: vec![power] });
+                m.coefficient =
+                    m.coefficient.clone().times(&Coefficient { number: Rational::one(), constants: vec![power] });
             }
             (Expr::Product(factors), Some(_)) => {
                 for f in factors {
@@ -360,7 +361,8 @@ impl<'a, N: FnMut(&Expr) -> Expr> Lowering<'a, N> {
         let magnitude = |c: &Coefficient| Coefficient { number: c.number.abs(), constants: c.constants.clone() };
         let shared = magnitude(&terms[0].coefficient);
         if terms.iter().all(|t| !t.powers.is_empty() && magnitude(&t.coefficient) == shared) {
-            let signed = terms.iter().map(|t| (self.powers(&t.powers).expect("not empty"), t.coefficient.number.is_negative()));
+            let signed =
+                terms.iter().map(|t| (self.powers(&t.powers).expect("not empty"), t.coefficient.number.is_negative()));
             let signed: Vec<_> = signed.collect();
             let (value, negative) = self.signed_sum(&signed);
             let sign = Coefficient::number(if negative { -Rational::one() } else { Rational::one() });
@@ -406,7 +408,11 @@ impl<'a, N: FnMut(&Expr) -> Expr> Lowering<'a, N> {
         let mut total = summands[first].0;
         for (i, &(value, negative)) in summands.iter().enumerate() {
             if i != first {
-                total = if negative == all_negative { self.builder.add(total, value) } else { self.builder.sub(total, value) };
+                total = if negative == all_negative {
+                    self.builder.add(total, value)
+                } else {
+                    self.builder.sub(total, value)
+                };
             }
         }
         (total, all_negative)

@@ -64,7 +64,8 @@ impl Plan {
             Integrator::ImplicitEuler | Integrator::Static => true,
             Integrator::SemiImplicitEuler | Integrator::CentralDifference => false,
         };
-        let laws = model.body.batches.iter().map(|b| law(b.law.info, b.elements.len(), b.per_element, implicit)).collect();
+        let laws =
+            model.body.batches.iter().map(|b| law(b.law.info, b.elements.len(), b.per_element, implicit)).collect();
         let (nodes, elements) = (model.body.masses.len(), model.body.elements.len());
         let real = match scene.solver.precision {
             Precision::F32 => 4,
@@ -140,7 +141,11 @@ fn scope(scene: &Scene, model: &Model, implicit: bool) -> (Vec<String>, Vec<Stri
     let large = model.body.batches.iter().any(|b| !b.law.info.structure.linear);
     say(large, "large deformation".into(), "large deformation: every law is linear, rotations are not modelled");
     let moving = model.body.motions.iter().any(|m| !m.is_constant());
-    say(!model.body.constraints.is_empty(), format!("{} imposed components", model.body.constraints.len()), "supports: none given");
+    say(
+        !model.body.constraints.is_empty(),
+        format!("{} imposed components", model.body.constraints.len()),
+        "supports: none given",
+    );
     say(moving, "imposed motion".into(), "imposed motion: no boundary moves");
     say(!model.body.loads.is_empty(), format!("{} loads", model.body.loads.len()), "loads: none given");
     left_out.push("contact: this version has none".to_string());

@@ -176,7 +176,9 @@ impl Recorder {
                 EnergyPart::External => state.energies.external,
                 EnergyPart::Total => state.energies.total(),
             },
-            Reader::Volume(elements) => elements.iter().map(|&e| current_volume(mesh, e as usize, &state.displacement)).sum(),
+            Reader::Volume(elements) => {
+                elements.iter().map(|&e| current_volume(mesh, e as usize, &state.displacement)).sum()
+            }
             Reader::Stress { elements, component, statistic } => {
                 let values = elements
                     .iter()

@@ -135,7 +135,18 @@ impl<'a, R: Precision> Run<'a, R> {
         let state = system.initial_state(model.velocity);
         let warnings = std::mem::take(&mut model.warnings);
         let step = seconds / model.scale.time;
-        Self { scene, model, system, state, integrator, step, steps, cost: StepReport::default(), warnings, limits: None }
+        Self {
+            scene,
+            model,
+            system,
+            state,
+            integrator,
+            step,
+            steps,
+            cost: StepReport::default(),
+            warnings,
+            limits: None,
+        }
     }
 
     fn all(mut self, out: Option<&Path>, observer: &mut (dyn Observer + Send)) -> Result<Outcome, RunError> {

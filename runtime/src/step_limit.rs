@@ -49,9 +49,9 @@ pub fn element_limit(body: &Body) -> f64 {
             }
             shape[10] = std::ptr::from_ref(batch.law) as u64;
             let material = constants.iter().map(|c| c.to_bits()).collect();
-            let value = *known.entry((material, shape)).or_insert_with(|| {
-                element_eigenvalue(kernels.dforce, constants, rest, density)
-            });
+            let value = *known
+                .entry((material, shape))
+                .or_insert_with(|| element_eigenvalue(kernels.dforce, constants, rest, density));
             largest = largest.max(value);
         }
     }
@@ -86,7 +86,9 @@ fn element_eigenvalue(
         }
     }
     let eigen = SymmetricEigen::new(metric);
-    let root = eigen.eigenvectors * Matrix3::from_diagonal(&eigen.eigenvalues.map(|x| x.max(0.0).sqrt())) * eigen.eigenvectors.transpose();
+    let root = eigen.eigenvectors
+        * Matrix3::from_diagonal(&eigen.eigenvalues.map(|x| x.max(0.0).sqrt()))
+        * eigen.eigenvectors.transpose();
     let mut both = SMatrix::<f64, 9, 9>::zeros();
     for i in 0..3 {
         both.fixed_view_mut::<3, 3>(3 * i, 3 * i).copy_from(&root);

@@ -68,11 +68,8 @@ impl<'a> Differential<'a> {
             }
             Kind::Stage { value: Value::Select { left, right, then, otherwise }, partials: None } => {
                 let (then, otherwise) = (self.of(&then)?, self.of(&otherwise)?);
-                let value = if then == otherwise {
-                    Value::Expr(then)
-                } else {
-                    Value::Select { left, right, then, otherwise }
-                };
+                let value =
+                    if then == otherwise { Value::Expr(then) } else { Value::Select { left, right, then, otherwise } };
                 self.named(&quantity.name, value)
             }
         };

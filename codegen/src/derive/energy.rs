@@ -201,14 +201,12 @@ impl<'a> Energy<'a> {
                 let square = self.basic(Invariant::Ddot(*base, *base))?;
                 let det = self.basic(Invariant::Det(*base))?;
                 let second = Expr::ratio(1, 2) * (power(&trace, 2) - square);
-                power(&c, 3)
-                    + power(&c, 2) * s.clone() * trace
-                    + c.clone() * power(s, 2) * second
-                    + power(s, 3) * det
+                power(&c, 3) + power(&c, 2) * s.clone() * trace + c.clone() * power(s, 2) * second + power(s, 3) * det
             }
             _ => {
                 return Err(DeriveError::Unsupported(
-                    "det of a sum of the small strain and a finite strain; write it by invariants of one of them".into(),
+                    "det of a sum of the small strain and a finite strain; write it by invariants of one of them"
+                        .into(),
                 ));
             }
         };

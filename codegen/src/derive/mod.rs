@@ -21,7 +21,7 @@ use crate::quantity::{Kind, Quantities, Value};
 
 use differential::Differential;
 use energy::Energy;
-use strain::{Invariant, Strain, SYMMETRIC};
+use strain::{Invariant, SYMMETRIC, Strain};
 
 /// Why a law could not be differentiated.
 #[derive(Debug, thiserror::Error)]
@@ -111,10 +111,8 @@ impl Session {
         // A normalisation that the system cannot express leaves the expression as it stands: still right.
         let normalize = |e: &Expr| cas.normalize(e).unwrap_or_else(|_| e.clone());
         let mut lowering = Lowering::new(&self.quantities, Some(&mut self.constants), normalize);
-        let outputs = outputs
-            .into_iter()
-            .map(|(role, es)| (role, es.iter().map(|e| lowering.value(e)).collect()))
-            .collect();
+        let outputs =
+            outputs.into_iter().map(|(role, es)| (role, es.iter().map(|e| lowering.value(e)).collect())).collect();
         let length = |role: Input| if role == Input::NodeGradient { 3 } else { 9 };
         lowering.finish(name, inputs.iter().map(|&r| (r, length(r))).collect(), outputs)
     }

@@ -68,16 +68,11 @@ fn name(k: usize, prefix: &str) -> String {
 impl Strain {
     /// G, and F = I + G.
     pub fn new(quantities: &mut Quantities) -> Self {
-        let gradient: [Symbol; 9] = std::array::from_fn(|k| {
-            quantities.add(name(k, "G"), Kind::Input(Input::DisplacementGradient, k as u32))
-        });
+        let gradient: [Symbol; 9] =
+            std::array::from_fn(|k| quantities.add(name(k, "G"), Kind::Input(Input::DisplacementGradient, k as u32)));
         // Off the diagonal F and G are the same numbers, hence the same symbols.
         let deformation = std::array::from_fn(|k| {
-            if k % 4 == 0 {
-                quantities.stage(name(k, "F"), Expr::int(1) + gradient[k].into())
-            } else {
-                gradient[k]
-            }
+            if k % 4 == 0 { quantities.stage(name(k, "F"), Expr::int(1) + gradient[k].into()) } else { gradient[k] }
         });
         Self { gradient, deformation, bases: BTreeMap::new(), jacobian: None, invariants: BTreeMap::new() }
     }
@@ -110,7 +105,8 @@ impl Strain {
         let mut components = Vec::with_capacity(6);
         for (a, b) in SYMMETRIC {
             let symmetric = g[3 * a + b].clone() + g[3 * b + a].clone();
-            let square = |x: &[Expr; 9]| Expr::Sum((0..3).map(|k| x[3 * k + a].clone() * x[3 * k + b].clone()).collect());
+            let square =
+                |x: &[Expr; 9]| Expr::Sum((0..3).map(|k| x[3 * k + a].clone() * x[3 * k + b].clone()).collect());
             let (label, value, definition) = match base {
                 Base::Eps => ("eps", Expr::ratio(1, 2) * symmetric.clone(), Expr::ratio(1, 2) * symmetric),
                 Base::A => ("A", symmetric + square(&g), square(&f)),
@@ -185,8 +181,7 @@ impl Strain {
                 let c = self.base(cas, quantities, b)?.map(Expr::from);
                 let [xx, yy, zz, xy, xz, yz] = c;
                 let two = Rational::from_integer(2);
-                let e = xx.clone() * yy.clone() * zz.clone()
-                    + Expr::int(2) * (xy.clone() * xz.clone() * yz.clone())
+                let e = xx.clone() * yy.clone() * zz.clone() + Expr::int(2) * (xy.clone() * xz.clone() * yz.clone())
                     - xx * yz.pow(two)
                     - yy * xz.pow(two)
                     - zz * xy.pow(two);

@@ -124,8 +124,7 @@ impl KernelIr {
         let Some(name) = head.strip_prefix("kernel ") else {
             return Err(error(first, format!("expected `kernel NAME`, found `{head}`")));
         };
-        let mut ir =
-            KernelIr { name: name.trim().to_string(), inputs: vec![], values: vec![], outputs: vec![] };
+        let mut ir = KernelIr { name: name.trim().to_string(), inputs: vec![], values: vec![], outputs: vec![] };
         for (line, text) in lines.by_ref() {
             let (code, comment) = match text.split_once('#') {
                 Some((code, comment)) => (code, Some(comment.trim().to_string())),

@@ -57,7 +57,8 @@ impl KernelIr {
     }
 
     fn broken_rule(&self) -> Option<String> {
-        if self.name.is_empty() || !self.name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_') {
+        if self.name.is_empty() || !self.name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
+        {
             return Some(format!("its name `{}` is not a snake_case identifier", self.name));
         }
         for (i, &(role, len)) in self.inputs.iter().enumerate() {

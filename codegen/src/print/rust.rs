@@ -293,7 +293,8 @@ fn snake_case(name: &str) -> String {
 }
 
 fn is_reserved(name: &str) -> bool {
-    let numbered = name.strip_prefix('v').is_some_and(|rest| !rest.is_empty() && rest.chars().all(|c| c.is_ascii_digit()));
+    let numbered =
+        name.strip_prefix('v').is_some_and(|rest| !rest.is_empty() && rest.chars().all(|c| c.is_ascii_digit()));
     numbered || !name.starts_with(|c: char| c.is_ascii_lowercase()) || syn::parse_str::<Ident>(name).is_err()
 }
 
@@ -302,7 +303,11 @@ fn statements(kernel: &ValidKernel, names: &[TokenStream], host: bool) -> Vec<To
     let call = |method: &str, v: &[ValueId]| {
         let method = Ident::new(method, Span::call_site());
         let values: Vec<_> = v.iter().map(|v| at(*v)).collect();
-        if host { quote!(<f64 as ::tensormass_kernels::Real>::#method(#(#values),*)) } else { quote!(R::#method(#(#values),*)) }
+        if host {
+            quote!(<f64 as ::tensormass_kernels::Real>::#method(#(#values),*))
+        } else {
+            quote!(R::#method(#(#values),*))
+        }
     };
     let mut lets = Vec::new();
     for (i, d) in kernel.ir().values.iter().enumerate() {

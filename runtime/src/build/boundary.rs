@@ -47,10 +47,8 @@ pub fn constraints(
             }
         }
     }
-    let constraints = found
-        .into_iter()
-        .map(|((node, component), (motion, _))| Constraint { node, component, motion })
-        .collect();
+    let constraints =
+        found.into_iter().map(|((node, component), (motion, _))| Constraint { node, component, motion }).collect();
     Ok((constraints, motions))
 }
 

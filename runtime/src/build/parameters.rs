@@ -96,8 +96,18 @@ fn column(
         if value.len() != info.len {
             return Err(SceneError::at(
                 scene.locate(&path),
-                format!("`{}`{which} has {} components, law `{}` takes {}", info.name, value.len(), law.info.name, info.len),
-                if info.len == 1 { "write one number".to_string() } else { format!("write an array of {} numbers", info.len) },
+                format!(
+                    "`{}`{which} has {} components, law `{}` takes {}",
+                    info.name,
+                    value.len(),
+                    law.info.name,
+                    info.len
+                ),
+                if info.len == 1 {
+                    "write one number".to_string()
+                } else {
+                    format!("write an array of {} numbers", info.len)
+                },
             ));
         }
         let (low, high) = info.range;

@@ -27,7 +27,8 @@ impl<'a> Places<'a> {
 
     /// The selected elements, ascending; at least one.
     pub fn elements(&self, scene: &Scene, path: &str, selection: &Selection) -> Result<Vec<u32>, SceneError> {
-        let group = |name: &str| self.mesh.element_group(name).map(|g| g.iter().map(|e: &ElementId| e.index()).collect());
+        let group =
+            |name: &str| self.mesh.element_group(name).map(|g| g.iter().map(|e: &ElementId| e.index()).collect());
         let centroids: Vec<[f64; 3]> = match selection.kind() {
             SelectionKind::All | SelectionKind::Group(_) => vec![[0.0; 3]; self.mesh.tets().len()],
             SelectionKind::Box(_) | SelectionKind::Where(_) => {
