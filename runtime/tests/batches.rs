@@ -151,8 +151,9 @@ fn reruns_change_nothing() {
 
 #[test]
 fn units_change_nothing() {
-    // Stress by even powers, so that time changes by powers of two as well.
-    for (length, stress) in [(-10, 0), (10, 0), (0, 8), (0, -8), (-3, 4)] {
+    // Stress by even powers, so that time changes by powers of two as well. The last two are the ends of what a scene
+    // may ask for: there energies in f32 would underflow or overflow in SI units.
+    for (length, stress) in [(-10, 0), (10, 0), (0, 8), (0, -8), (-3, 4), (-28, -18), (17, 18)] {
         let (length, stress) = (2.0_f64.powi(length), 2.0_f64.powi(stress));
         check("units", &SWING, &Swing { length, stress, ..SWING });
     }

@@ -55,12 +55,13 @@ fn critical(system: &mut Cpu<f64>) -> f64 {
 }
 
 /// The matrix that takes (u, v / omega) of the oscillator over one step.
-fn transition(integrator: &str, omega_h: f64) -> [[f64; 2]; 2] {
+fn transition(integrator: &str, omega_h: f64, alpha_h: f64) -> [[f64; 2]; 2] {
     let law = laws().iter().find(|l| l.info.structure.linear).expect("a linear law");
     let mut columns = [[0.0; 2]; 2];
     for (start, column) in [[1.0, 0.0], [0.0, 1.0]].into_iter().zip(&mut columns) {
         let mut system = one_element(law, 1);
         let omega = 2.0 / critical(&mut system);
+        system.body.mass_damping = alpha_h * omega / omega_h;
         let mut state = system.initial_state([0.0; 3]);
         state.u[3][0] = start[0];
         state.v[3][0] = start[1] * omega;
@@ -84,18 +85,41 @@ fn one_mode() {
     for c in case("OSCILLATOR")["expected"].as_array().expect("a list") {
         let x = number(&c["omega_h"]);
         // u + i v / omega is multiplied by 1 / (1 + i omega h).
-        let [[a, b], [d, e]] = transition("implicit-euler", x);
+        let [[a, b], [d, e]] = transition("implicit-euler", x, 0.0);
         check(&format!("{x}: structure"), (a - e).hypot(b + d), 0.0, 1e-6 * a.hypot(d));
         check(&format!("{x}: amplitude"), a.hypot(d), number(&c["implicit_euler_amp_per_step"]), 1e-6);
         check(&format!("{x}: phase"), (-d).atan2(a), number(&c["implicit_euler_phase_per_step"]), 1e-6);
 
-        let [[a, b], [d, e]] = transition("semi-implicit-euler", x);
+        let [[a, b], [d, e]] = transition("semi-implicit-euler", x, 0.0);
         let (half_trace, determinant) = (0.5 * (a + e), a * e - b * d);
         let discriminant = half_trace * half_trace - determinant;
         let radius = if discriminant < 0.0 { determinant.sqrt() } else { half_trace.abs() + discriminant.sqrt() };
         check(&format!("{x}: spectral radius"), radius, number(&c["symplectic_spectral_radius"]), 1e-6);
         if let Some(ratio) = c["symplectic_period_ratio_hnum_over_exact"].as_f64() {
             check(&format!("{x}: period"), x / (-discriminant).sqrt().atan2(half_trace), ratio, 1e-6);
+        }
+    }
+}
+
+/// One step with damping, a = alpha h and w = omega h, against the schemes as written: implicit Euler solves
+/// (1 + a + w^2) v+ = v - w u, the other two are explicit; to rounding, 1e-12 with the solver's tolerance.
+#[test]
+fn one_damped_mode() {
+    for (w, a) in [(0.5, 0.3), (1.2, 0.05)] {
+        for (integrator, [of_u, of_v]) in [
+            ("implicit-euler", [-w / (1.0 + a + w * w), 1.0 / (1.0 + a + w * w)]),
+            ("semi-implicit-euler", [-w, 1.0 - a]),
+            // Half a step back, then v+ = ((2 - a) v- - 2 w u) / (2 + a).
+            (
+                "central-difference",
+                [((2.0 - a) * 0.5 * w - 2.0 * w) / (2.0 + a), (2.0 - a) * (1.0 + 0.5 * a) / (2.0 + a)],
+            ),
+        ] {
+            let [[uu, uv], [vu, vv]] = transition(integrator, w, a);
+            let wanted = [1.0 + w * of_u, w * of_v, of_u, of_v];
+            for (k, (value, wanted)) in [uu, uv, vu, vv].into_iter().zip(wanted).enumerate() {
+                check(&format!("{integrator}, w {w}, a {a}, entry {k}"), value, wanted, 1e-12);
+            }
         }
     }
 }

@@ -160,7 +160,8 @@ fn run_at(fraction: f64, integrator: &str) {
         assert!(summary["error"].as_str().is_some_and(|e| e.starts_with("the simulation diverged")), "{summary}");
         // Every step but the last, which is the one that was refused; a frame each ten, the first and the last.
         let steps = summary["steps"].as_u64().expect("a number") as usize;
-        assert!((10..3000).contains(&steps), "{steps} steps");
+        // The fastest mode grows by 1.49 a step; from rounding (1e-16 m) to 1e4 times the body takes at most 120.
+        assert!((10..150).contains(&steps), "{steps} steps");
         assert_eq!((rows, frames), (steps, (steps - 1) / 10 + 2));
     }
 }
