@@ -11,12 +11,15 @@ use tensormass_codegen::lock::{LOCK_VARIABLE, MachineLock, path};
 
 /// Where a child writes when it enters and leaves its work.
 const LOG: &str = "TENSORMASS_TEST_LOCK_LOG";
+/// Set where a child's work lasts until the other has begun its own.
+const MEET: &str = "TENSORMASS_TEST_LOCK_MEET";
 /// Longer than two processes started together are apart, so that without the lock their work would overlap.
 const WORK: Duration = Duration::from_millis(500);
 
 fn log(file: &Path, word: &str) {
     let mut file = std::fs::OpenOptions::new().create(true).append(true).open(file).expect("the log");
-    writeln!(file, "{word} {}", std::process::id()).expect("the log");
+    // One write, so that two processes' lines do not mix.
+    file.write_all(format!("{word} {}\n", std::process::id()).as_bytes()).expect("the log");
 }
 
 /// In a child, the work; otherwise nothing.
@@ -26,7 +29,14 @@ fn child() {
         log(Path::new(&file), "starts");
         let _lock = MachineLock::acquire().expect("the lock");
         log(Path::new(&file), "enters");
-        std::thread::sleep(WORK);
+        let entered = || std::fs::read_to_string(&file).expect("the log").matches("enters").count();
+        if std::env::var_os(MEET).is_some() {
+            while entered() < 2 {
+                std::thread::sleep(Duration::from_millis(10));
+            }
+        } else {
+            std::thread::sleep(WORK);
+        }
         log(Path::new(&file), "leaves");
     }
 }
@@ -36,13 +46,12 @@ fn check(locks: [&Path; 2], overlap: bool) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = folder.path().join("log");
     let children = locks.map(|lock| {
-        Command::new(std::env::current_exe().expect("this executable"))
-            .args(["--exact", "child"])
-            .env(LOG, &file)
-            .env(LOCK_VARIABLE, lock)
-            .stdout(std::process::Stdio::null())
-            .spawn()
-            .expect("a child")
+        let mut command = Command::new(std::env::current_exe().expect("this executable"));
+        command.args(["--exact", "child"]).env(LOG, &file).env(LOCK_VARIABLE, lock).stdout(std::process::Stdio::null());
+        if overlap {
+            command.env(MEET, "1");
+        }
+        command.spawn().expect("a child")
     });
     for mut child in children {
         assert!(child.wait().expect("a child").success());
@@ -59,7 +68,7 @@ fn work_under_the_lock_never_overlaps() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let lock = folder.path().join("lock");
     check([&lock, &lock], false);
-    // With a lock each, they do overlap: the children are quick enough for the assertion above to mean something.
+    // With a lock each, they do overlap: each works until the other does too.
     check([&folder.path().join("one"), &folder.path().join("two")], true);
 }
 
