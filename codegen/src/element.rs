@@ -142,6 +142,18 @@ fn shape(b: &mut Builder, j: u32, k: u32) -> ValueId {
     b.input(Input::ShapeGradients, 3 * (j - 1) + k)
 }
 
+/// Minus the sum of vectors of three components, which follow each other.
+fn minus_sum(b: &mut Builder, vectors: &[ValueId]) -> Vec<ValueId> {
+    (0..3)
+        .map(|i| {
+            let mut components = vectors.iter().skip(i).step_by(3).copied();
+            let first = components.next().expect("an element has more than one node");
+            let sum = components.fold(first, |sum, v| b.add(sum, v));
+            b.neg(sum)
+        })
+        .collect()
+}
+
 fn gradient(n: u32) -> KernelIr {
     let mut b = Builder::new();
     let mut g = Vec::new();
@@ -190,15 +202,7 @@ fn contract(n: u32) -> KernelIr {
         }
     }
     // The forces of an element sum to zero: the first node's is minus the others'.
-    let first: Vec<ValueId> = (0..3)
-        .map(|i| {
-            let mut sum = forces[i];
-            for j in 1..(n as usize - 1) {
-                sum = b.add(sum, forces[3 * j + i]);
-            }
-            b.neg(sum)
-        })
-        .collect();
+    let first = minus_sum(&mut b, &forces);
     let inputs = vec![(Input::StressIn, 9), (Input::ShapeGradients, 3 * (n - 1)), (Input::Weight, 1)];
     b.finish("contract", inputs, vec![(Output::NodalForce, first.into_iter().chain(forces).collect())])
 }
@@ -207,15 +211,7 @@ fn node_gradients(n: u32) -> KernelIr {
     let mut b = Builder::new();
     let others: Vec<ValueId> =
         (1..n).flat_map(|j| (0..3).map(move |k| (j, k))).map(|(j, k)| shape(&mut b, j, k)).collect();
-    let first: Vec<ValueId> = (0..3)
-        .map(|k| {
-            let mut sum = others[k];
-            for j in 1..(n as usize - 1) {
-                sum = b.add(sum, others[3 * j + k]);
-            }
-            b.neg(sum)
-        })
-        .collect();
+    let first = minus_sum(&mut b, &others);
     let inputs = vec![(Input::ShapeGradients, 3 * (n - 1))];
     b.finish("node_gradients", inputs, vec![(Output::NodeGradients, first.into_iter().chain(others).collect())])
 }

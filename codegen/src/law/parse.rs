@@ -97,7 +97,7 @@ fn stem(source: &Source) -> Result<String, Vec<LawError>> {
         return Ok(stem.to_owned());
     }
     let reason = format!("the file's name `{stem}` cannot name a law");
-    let remedy = "name the file in lower case, digits and `_`, as in `neo_hookean.rs`";
+    let remedy = "name the file in lower case, digits and `_`, as in `my_law.rs`";
     Err(vec![source.error(START, reason, remedy)])
 }
 

@@ -7,7 +7,7 @@ use crate::body::Constraint;
 use crate::history::History;
 use crate::mesh::TetMesh;
 use crate::scale::Scale;
-use crate::scene::{self, Axis, Boundary, Scene, SceneError};
+use crate::scene::{Axis, Boundary, Scene, SceneError};
 
 /// The constrained components, ascending, and the histories that they follow; in scaled units.
 pub fn constraints(
@@ -58,25 +58,7 @@ fn histories(boundary: &Boundary) -> Vec<(u8, History)> {
         Boundary::Fixed { fix, .. } => fix.iter().map(|&axis| (index(axis), History::constant(0.0))).collect(),
         Boundary::Moved { motion, .. } => [(Axis::X, &motion.x), (Axis::Y, &motion.y), (Axis::Z, &motion.z)]
             .into_iter()
-            .filter_map(|(axis, h)| h.as_ref().map(|h| (index(axis), history(h))))
+            .filter_map(|(axis, h)| h.as_ref().map(|h| (index(axis), h.table())))
             .collect(),
     }
-}
-
-/// A velocity is a table that ends after the longest duration a scene may have.
-const LONGEST: f64 = 1e9;
-
-fn history(h: &scene::History) -> History {
-    match h {
-        scene::History::Ramp(ramp) => table(ramp),
-        scene::History::Velocity(v) => {
-            History::table(vec![(0.0, 0.0), (LONGEST, v * LONGEST)]).expect("two finite, increasing entries")
-        }
-    }
-}
-
-/// The table of a ramp, whose times the scene has checked to increase.
-pub fn table(ramp: &scene::Ramp) -> History {
-    let rows = ramp.rows().iter().map(|r| (r[0], r[1])).collect();
-    History::table(rows).unwrap_or_else(|| History::constant(0.0))
 }

@@ -1,6 +1,5 @@
 //! Loads as nodal forces: weight, tractions on boundary faces, forces at nodes.
 
-use super::boundary::table;
 use super::place::Places;
 use crate::body::Load;
 use crate::history::History;
@@ -55,7 +54,7 @@ pub fn loads(
                 ramp
             }
         };
-        let history = ramp.as_ref().map_or_else(|| History::constant(1.0), table);
+        let history = ramp.as_ref().map_or_else(|| History::constant(1.0), scene::Ramp::table);
         loads.push(Load { forces, history: history.scaled(1.0 / scale.time, 1.0) });
     }
     Ok(loads)

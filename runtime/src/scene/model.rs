@@ -5,6 +5,7 @@
 
 use super::output::{Output, Probe};
 use super::selection::Selection;
+use crate::history::History as Table;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -202,9 +203,8 @@ impl Boundary {
     pub fn displacement(&self, time: f64) -> [Option<f64>; 3] {
         match self {
             Self::Fixed { fix, .. } => [Axis::X, Axis::Y, Axis::Z].map(|axis| fix.contains(&axis).then_some(0.0)),
-            Self::Moved { motion, .. } => {
-                [&motion.x, &motion.y, &motion.z].map(|history| history.as_ref().map(|history| history.value(time)))
-            }
+            Self::Moved { motion, .. } => [&motion.x, &motion.y, &motion.z]
+                .map(|history| history.as_ref().map(|history| history.table().at(time))),
         }
     }
 }
@@ -235,14 +235,20 @@ pub enum History {
 }
 
 impl History {
-    /// Displacement in m at a time in s.
-    pub fn value(&self, time: f64) -> f64 {
+    /// The displacement in m over time in s.
+    pub fn table(&self) -> Table {
         match self {
-            Self::Ramp(ramp) => ramp.value(time),
-            Self::Velocity(velocity) => velocity * time,
+            Self::Ramp(ramp) => ramp.table(),
+            // A velocity is a table that ends with the longest duration a scene may have.
+            Self::Velocity(velocity) => {
+                Table::table(vec![(0.0, 0.0), (LONGEST, velocity * LONGEST)]).expect("two finite, increasing entries")
+            }
         }
     }
 }
+
+/// The longest duration of a scene in s.
+const LONGEST: f64 = 1e9;
 
 /// A piecewise linear table of [time in s, value]: constant before its first and after its last row. Times are within
 /// 0 and 1e9, strictly increasing; values within +-1e12 (m for a displacement, a factor of 1 for a load).
@@ -256,14 +262,9 @@ impl Ramp {
         &self.0
     }
 
-    /// The value at a time in s.
-    pub fn value(&self, time: f64) -> f64 {
-        let after = self.0.partition_point(|row| row[0] <= time);
-        match (after.checked_sub(1).map(|i| self.0[i]), self.0.get(after)) {
-            (Some([t0, v0]), Some(&[t1, v1])) => v0 + (v1 - v0) * ((time - t0) / (t1 - t0)),
-            (Some([_, value]), None) | (None, Some(&[_, value])) => value,
-            (None, None) => 0.0,
-        }
+    /// The value over time in s. Its times increase: no scene is read whose times do not.
+    pub fn table(&self) -> Table {
+        Table::table(self.0.iter().map(|row| (row[0], row[1])).collect()).unwrap_or_else(|| Table::constant(0.0))
     }
 
     /// The time in s after which the value no longer changes.
@@ -344,7 +345,7 @@ impl Load {
     pub fn factor(&self, time: f64) -> f64 {
         match self {
             Self::Gravity { ramp, .. } | Self::Traction { ramp, .. } | Self::Force { ramp, .. } => {
-                ramp.as_ref().map_or(1.0, |ramp| ramp.value(time))
+                ramp.as_ref().map_or(1.0, |ramp| ramp.table().at(time))
             }
         }
     }
