@@ -436,7 +436,8 @@ impl Solver {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ConjugateGradient {
-    /// Stop when the residual's norm has fallen by this factor; above 0, below 1.
+    /// Stop when the residual's norm has fallen by this factor; above 0, below 1. Newton's method on a nonlinear law asks
+    /// for less where less is enough.
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub tolerance: f64,
     /// Most iterations in one solution, from 1 to 1000000.
