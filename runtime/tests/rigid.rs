@@ -17,6 +17,7 @@ const BOUND: f64 = 100.0 * f64::EPSILON;
 struct Case {
     mesh: TetMesh,
     system: Cpu<f64>,
+    law: &'static LawEntry,
     /// The largest diagonal entry of K at rest.
     stiffness: f64,
 }
@@ -33,7 +34,12 @@ fn free(law: &'static LawEntry, random: &mut Random) -> Case {
     let rest = system.backend.zeros();
     let d = diagonal(&mut system, &rest);
     let stiffness = system.backend.max_abs(&d);
-    Case { mesh, system, stiffness }
+    Case { law, mesh, system, stiffness }
+}
+
+/// Whether the law's tangent has a comparison in it.
+fn selects(law: &LawEntry) -> bool {
+    law.info.operations.iter().any(|o| o.kernel == "dforce" && o.selects > 0)
 }
 
 fn force(system: &mut Cpu<f64>, u: &Vec<[f64; 3]>) -> Vec<[f64; 3]> {
@@ -176,6 +182,10 @@ fn tangent_is_symmetric_and_has_its_diagonal() {
             let d = diagonal(&mut case.system, &u);
             let off = d.as_flattened().iter().enumerate().map(|(i, d)| (d - k[(i, i)]).abs()).fold(0.0, f64::max);
             within("diagonal", off, BOUND * case.stiffness)?;
+            // A law that selects may have a kink at rest, where no difference finds the one-sided tangent.
+            if at_rest && selects(case.law) {
+                continue;
+            }
             // Its differential is that of the force: central differences with d = 1e-4 err by d^2 and by eps_m / d.
             let (step, direction) = (1e-4, (0..u.len()).map(|_| random.vector(1.0)).collect::<Vec<_>>());
             let at = |sign: f64| -> Vec<[f64; 3]> {
