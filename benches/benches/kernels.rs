@@ -6,8 +6,8 @@ use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use tensormass_runtime::backend::{Backend, ForceField};
-use tensormass_runtime::build::build;
 use tensormass_runtime::cpu::{CpuBackend, CpuField, Precision};
+use tensormass_runtime::model::build;
 use tensormass_runtime::scene::parse;
 use tensormass_runtime::{LawInfo, laws};
 

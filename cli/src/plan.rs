@@ -1,7 +1,7 @@
 //! `tensormass plan`: what a scene will compute, and what it leaves out.
 
 use clap::Args;
-use tensormass_runtime::build::build;
+use tensormass_runtime::model::build;
 use tensormass_runtime::plan::{Plan, integrator_name, precision_name};
 
 use crate::failure::Failure;
@@ -33,6 +33,9 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
         integrator_name(scene.solver.integrator),
         precision_name(scene.solver.precision)
     );
+    for line in plan.quality.to_string().lines() {
+        out += &format!("  {line}\n");
+    }
     for law in &plan.laws {
         let unreviewed = if law.info.reviewed { "" } else { " (unreviewed)" };
         let constants = if law.per_element { "one set of constants an element" } else { "one set of constants" };

@@ -1,7 +1,7 @@
 //! Soft bodies in motion: meshes, force fields, solvers, integrators, scenes and results.
 //!
 //! ```text
-//! scene file --scene--> Scene --build--> Body (scaled units) --System--> Backend + ForceField --integrate--> results
+//! scene file --scene--> Scene --model--> Body (scaled units) --System--> Backend + ForceField --integrate--> results
 //! ```
 //!
 //! Kernels come from `tensormass-kernels`; nothing here knows how they were derived. Integrators are written once over
@@ -9,13 +9,14 @@
 
 pub mod backend;
 pub mod body;
-pub mod build;
+
 pub mod cg;
 pub mod cpu;
 mod frames;
 pub mod history;
 pub mod integrate;
 pub mod mesh;
+pub mod model;
 pub mod output;
 pub mod plan;
 pub mod probe;

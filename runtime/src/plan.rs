@@ -3,7 +3,8 @@
 use serde_json::{Value, json};
 use tensormass_kernels::LawInfo;
 
-use crate::build::Model;
+use crate::mesh::Quality;
+use crate::model::Model;
 use crate::scene::{Integrator, Precision, Scene};
 
 /// Operations of the linear tetrahedron around a point kernel, counted in its generated text.
@@ -33,6 +34,8 @@ pub struct Plan {
     pub buffers: Vec<(&'static str, usize)>,
     /// Elements of the mesh.
     pub elements: usize,
+    /// How small and how distorted the elements are.
+    pub quality: Quality,
     /// What is modelled.
     pub modelled: Vec<String>,
     /// What is left out, and why.
@@ -87,7 +90,7 @@ impl Plan {
         }
         passes.push("nodes: update of the state");
         let (modelled, left_out) = scope(scene, model, implicit);
-        Self { laws, passes, buffers, elements, modelled, left_out }
+        Self { laws, passes, buffers, elements, quality: model.quality, modelled, left_out }
     }
 
     /// Bytes an element over all buffers.
@@ -112,6 +115,11 @@ impl Plan {
         let buffers: serde_json::Map<String, Value> =
             self.buffers.iter().map(|(n, b)| ((*n).to_string(), json!(b))).collect();
         json!({
+            "mesh": {
+                "min_volume_m3": self.quality.min_volume, "max_volume_m3": self.quality.max_volume,
+                "min_altitude_m": self.quality.min_altitude, "min_dihedral_deg": self.quality.min_dihedral,
+                "max_dihedral_deg": self.quality.max_dihedral, "worst_radius_ratio": self.quality.worst_radius_ratio,
+            },
             "laws": laws, "passes": self.passes, "buffers_bytes": buffers,
             "bytes_per_element": self.bytes_per_element(), "modelled": self.modelled, "left_out": self.left_out,
         })

@@ -1,9 +1,9 @@
 //! Probes: numbers read off a state, by name.
 
 use crate::body::Constraint;
-use crate::build::loads::area;
-use crate::build::place::Places;
 use crate::mesh::TetMesh;
+use crate::model::loads::area;
+use crate::model::place::Places;
 use crate::scene::{Component, EnergyPart, Probe, Scene, SceneError, Statistic, StressComponent};
 
 /// Energies of the whole body in J.

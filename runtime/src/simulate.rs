@@ -6,11 +6,11 @@ use std::time::Instant;
 use serde_json::{Value, json};
 
 use crate::backend::{Backend, ForceField, LeftDomain};
-use crate::build::{BuildError, Model, build};
 use crate::cg::CgLimits;
 use crate::cpu::{CpuBackend, CpuField, Precision};
 use crate::frames::{FrameData, Frames};
 use crate::integrate::{CentralDifference, ImplicitEuler, NewtonLimits, SemiImplicitEuler, SolverSettings, Statics};
+use crate::model::{BuildError, Model, build};
 use crate::output::{OutputError, ProbeTable, create_folder, remove_file, write_json_atomic};
 use crate::plan::{Plan, integrator_name, precision_name};
 use crate::probe::{Energies, Needs, Snapshot};

@@ -4,9 +4,9 @@ mod support;
 
 use support::{Random, body, outcome, parameters, parameters_text, scene, system};
 use tensormass_runtime::backend::{Backend, ForceField};
-use tensormass_runtime::build::{Model, build};
 use tensormass_runtime::laws;
 use tensormass_runtime::mesh::beam;
+use tensormass_runtime::model::{Model, build};
 use tensormass_runtime::scene::Scene;
 use tensormass_runtime::simulate::Ending;
 

@@ -61,10 +61,10 @@ fn check(text: &str, out: &str, expected: &str) {
     fs::write(at.join("values.csv"), "1e6\n".repeat(24)).expect("a table");
     let out = at.join(out);
     let before = fs::read_dir(at).expect("a folder").count();
-    let laws = tensormass_runtime::laws().iter().map(|l| l.info.name).collect::<Vec<_>>().join(", ");
+    let names = laws().iter().map(|l| l.info.name).collect::<Vec<_>>().join(", ");
     let message = match attempt(text, at, &out) {
         Ok(outcome) => format!("accepted: {:?}", outcome.ending),
-        Err(message) => message.replace(&at.display().to_string(), "DIR").replace(&laws, "LAWS"),
+        Err(message) => message.replace(&at.display().to_string(), "DIR").replace(&names, "LAWS"),
     };
     assert!(message == expected, "\n--- expected\n{expected}\n--- found\n{message}\n--- for\n{text}");
     assert_eq!(fs::read_dir(at).expect("a folder").count(), before, "something was written: {message}");

@@ -11,6 +11,7 @@ use tensormass_kernels::batch::{Batch, RestElement};
 use super::{CpuBackend, Precision};
 use crate::backend::{Backend, ForceField, LeftDomain};
 use crate::body::{Body, LawBatch};
+use crate::mesh::{Incidence, NodeId};
 
 /// Elements a task.
 const CHUNK: usize = 512;
@@ -92,8 +93,8 @@ impl<R: Precision> CpuBatch<R> {
 pub struct CpuField<R: Precision> {
     batches: Vec<CpuBatch<R>>,
     slots: Vec<Slots<R>>,
-    offsets: Vec<u32>,
-    incident: Vec<u32>,
+    /// Which slots belong to each node; elements count batch after batch.
+    incidence: Incidence,
     /// The displacement at which the tangent is taken.
     state: Vec<[R; 3]>,
 }
@@ -102,12 +103,12 @@ impl<R: Precision> CpuField<R> {
     /// The elements of a body, in batches.
     pub fn new(body: &Body) -> Self {
         let batches: Vec<CpuBatch<R>> = body.batches.iter().map(|b| CpuBatch::new(body, b)).collect();
-        let (offsets, incident) = slots_of_nodes(body.masses.len(), batches.iter().flat_map(|b| &b.nodes));
+        let elements = batches.iter().flat_map(|b| &b.nodes).map(|nodes| nodes.map(|n| n as usize));
+        let incidence = Incidence::of_elements(body.masses.len(), elements);
         Self {
-            slots: vec![[[R::default(); 3]; 4]; incident.len() / 4],
+            slots: vec![[[R::default(); 3]; 4]; incidence.slots().len() / 4],
             batches,
-            offsets,
-            incident,
+            incidence,
             state: vec![[R::default(); 3]; body.masses.len()],
         }
     }
@@ -135,7 +136,7 @@ impl<R: Precision> CpuField<R> {
             for (i, y) in y.iter_mut().enumerate() {
                 let node = k * CHUNK + i;
                 let mut sum = [R::default(); 3];
-                for &slot in &self.incident[self.offsets[node] as usize..self.offsets[node + 1] as usize] {
+                for &slot in self.incidence.of(NodeId(node as u32)) {
                     let partial = flat[slot as usize];
                     for c in 0..3 {
                         sum[c] = sum[c] + partial[c];
@@ -215,23 +216,4 @@ impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
         self.state = state;
         self.nodes(R::from_f64(factor), d);
     }
-}
-
-/// For each node the slots 4 e + a that hold its partial forces, ascending; e counts elements batch after batch.
-fn slots_of_nodes<'a>(nodes: usize, elements: impl Iterator<Item = &'a [u32; 4]> + Clone) -> (Vec<u32>, Vec<u32>) {
-    let mut offsets = vec![0u32; nodes + 1];
-    for n in elements.clone().flatten() {
-        offsets[*n as usize + 1] += 1;
-    }
-    for i in 0..nodes {
-        offsets[i + 1] += offsets[i];
-    }
-    let mut next = offsets.clone();
-    let mut incident = vec![0u32; offsets[nodes] as usize];
-    for (slot, n) in elements.flatten().enumerate() {
-        let place = &mut next[*n as usize];
-        incident[*place as usize] = slot as u32;
-        *place += 1;
-    }
-    (offsets, incident)
 }

@@ -16,18 +16,25 @@ pub struct Incidence {
 impl Incidence {
     /// The incidence of a mesh: 16 bytes an element and 4 a node.
     pub fn new(mesh: &TetMesh) -> Incidence {
-        let nodes = mesh.nodes().len();
+        Self::of_elements(mesh.nodes().len(), mesh.tets().iter().map(|t| t.map(NodeId::index)))
+    }
+
+    /// The incidence of elements in an order of their own, over this many nodes: slots count in that order.
+    ///
+    /// # Panics
+    /// If an element names a node beyond `nodes`.
+    pub fn of_elements(nodes: usize, elements: impl Iterator<Item = [usize; 4]> + Clone) -> Incidence {
         let mut offsets = vec![0_u32; nodes + 1];
-        for node in mesh.tets().iter().flatten() {
-            offsets[node.index() + 1] += 1;
+        for node in elements.clone().flatten() {
+            offsets[node + 1] += 1;
         }
         for node in 0..nodes {
             offsets[node + 1] += offsets[node];
         }
-        let mut slots = vec![0_u32; 4 * mesh.tets().len()];
+        let mut slots = vec![0_u32; offsets[nodes] as usize];
         let mut next = offsets.clone();
-        for (slot, node) in mesh.tets().iter().flatten().enumerate() {
-            let place = &mut next[node.index()];
+        for (slot, node) in elements.flatten().enumerate() {
+            let place = &mut next[node];
             // `as u32` is exact: a mesh has at most MAX_ELEMENTS elements.
             slots[*place as usize] = slot as u32;
             *place += 1;

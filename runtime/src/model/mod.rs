@@ -13,7 +13,7 @@ use tensormass_kernels::batch::RestElement;
 
 use crate::body::{self, Body};
 use crate::mesh::gmsh::{self, MeshFileError};
-use crate::mesh::{self, Orientation, TetMesh};
+use crate::mesh::{self, Orientation, Quality, TetMesh};
 use crate::probe::Recorder;
 use crate::scale::Scale;
 use crate::scene::{Mesh, Scene, SceneError};
@@ -37,6 +37,8 @@ pub enum BuildError {
 pub struct Model {
     /// The mesh (m).
     pub mesh: TetMesh,
+    /// How small and how distorted its elements are.
+    pub quality: Quality,
     /// The body, in scaled units.
     pub body: Body,
     /// The units.
@@ -53,6 +55,9 @@ pub struct Model {
     pub warnings: Vec<String>,
 }
 
+/// Elements of a lower radius ratio are worth a warning; mesh generators keep to .1 and better.
+const SLIVER: f64 = 0.01;
+
 /// Builds the body of a scene.
 ///
 /// # Errors
@@ -60,6 +65,14 @@ pub struct Model {
 pub fn build(scene: &Scene) -> Result<Model, BuildError> {
     let mut warnings = scene.warnings();
     let mesh = load_mesh(scene, &mut warnings)?;
+    let quality = Quality::of(&mesh);
+    if quality.worst_radius_ratio < SLIVER {
+        warnings.push(format!(
+            "element {} is a sliver (radius ratio {:.1e}, 1 is best): it limits explicit steps and slows solvers; improve \
+             the mesh there",
+            quality.worst_element.0, quality.worst_radius_ratio
+        ));
+    }
     let places = Places::new(&mesh);
     let assignment = material::assign(scene, &mesh, &places)?;
     let [low, high] = mesh.bounding_box();
@@ -102,7 +115,7 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
         diameter: diagonal / scale.length,
         volume: mesh.total_volume() / scale.length.powi(3),
     };
-    Ok(Model { materials: assignment.reports(), assignment, mesh, body, scale, recorder, velocity, warnings })
+    Ok(Model { materials: assignment.reports(), assignment, quality, mesh, body, scale, recorder, velocity, warnings })
 }
 
 fn load_mesh(scene: &Scene, warnings: &mut Vec<String>) -> Result<TetMesh, BuildError> {
