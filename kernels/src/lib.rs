@@ -15,8 +15,10 @@ pub use law::{BatchKernels, Law, LawEntry, LawInfo, Operations, ParameterInfo, S
 pub use real::Real;
 
 /// The kernels printed by the generator for this build.
+// Generated text: its generator is tested instead.
 #[allow(missing_docs, unused_variables, clippy::all, unused_qualifications)]
-#[allow(rustdoc::broken_intra_doc_links, rustdoc::invalid_html_tags, rustdoc::bare_urls)] // a law's own text // generated text: its generator is tested instead
+// A law's own text is no rustdoc.
+#[allow(rustdoc::broken_intra_doc_links, rustdoc::invalid_html_tags, rustdoc::bare_urls)]
 pub mod generated {
     include!(concat!(env!("OUT_DIR"), "/kernels.rs"));
 }
