@@ -141,9 +141,10 @@ impl<B: Backend> Newton<B> {
         self.diagonal(system, equation);
         let linearised = settings.newton.max_iterations == 1;
         // What the first linear solution has to balance: the scale of the residual.
-        let reference = if linearised { 0.0 } else { self.imbalance(system, equation, x) };
+        let judged = !linearised || equation.mass == 0.0;
+        let reference = if judged { self.imbalance(system, equation, x) } else { 0.0 };
         system.backend.copy(equation.u, &mut self.u);
-        if !linearised && reference <= self.rounding(system, equation, 0.0) {
+        if judged && reference <= self.rounding(system, equation, 0.0) {
             // Nothing but the rounding of K u is out of balance: a solution would chase noise.
             return Ok(report);
         }
