@@ -308,7 +308,7 @@ fn momentum_of_a_free_body() {
 /// A body that falls ten thousand times its size is no blow-up.
 #[test]
 fn a_long_fall_is_no_divergence() {
-    let fall = support::scene::<&str>(
+    let fall = scene::<&str>(
         r#"
 [mesh]
 beam = { size = [1e-3, 1e-3, 1e-3], cells = [1, 1, 1] }
@@ -331,9 +331,9 @@ component = "z"
 "#,
         &[],
     );
-    let z = support::probe(&support::done(&fall), "z");
+    let z = probe(&done(&fall), "z");
     // Semi-implicit Euler sums h^2 (1 + .. + n) = h^2 n (n + 1) / 2.
-    assert!(support::relative(z, -1000.0 * 1e-8 * 3000.0 * 3001.0 / 2.0) <= 1e-9, "{z}");
+    assert!(relative(z, -1000.0 * 1e-8 * 3000.0 * 3001.0 / 2.0) <= 1e-9, "{z}");
 }
 
 /// Semi-implicit Euler conserves E - h/2 v . K u, and |h/2 v . K u| <= omega h / 2 E: with omega h = .2 the energy stays
