@@ -28,11 +28,6 @@ impl History {
         }
     }
 
-    /// The value once every entry has passed.
-    pub fn end(&self) -> f64 {
-        self.0.last().expect("a table has an entry").1
-    }
-
     /// The same function with times and values multiplied.
     pub fn scaled(&self, time: f64, value: f64) -> Self {
         Self(self.0.iter().map(|&(t, v)| (t * time, v * value)).collect())

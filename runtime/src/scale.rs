@@ -28,11 +28,6 @@ impl Scale {
         Self { length, stress, time }
     }
 
-    /// SI units unscaled.
-    pub fn si() -> Self {
-        Self { length: 1.0, stress: 1.0, time: 1.0 }
-    }
-
     /// SI value of one unit with these exponents of length, stress and time.
     pub fn unit(&self, [length, stress, time]: [i32; 3]) -> f64 {
         self.length.powi(length) * self.stress.powi(stress) * self.time.powi(time)

@@ -164,7 +164,8 @@ impl<'a, R: Precision> Run<'a, R> {
             && let Some(frames) = &mut results.frames
         {
             // The last state that was computed, wherever the run stopped.
-            let needs = Needs { reactions: false, energies: false, stresses: false };
+            // Its energy may be undefined: that is how some runs end.
+            let needs = Needs { energies: false, ..frames.needs() };
             if let Ok(data) = self.frame(needs) {
                 let time = self.state.time * self.model.scale.time;
                 frames.write(&self.model.mesh, time, &data)?;
@@ -284,9 +285,11 @@ impl<'a, R: Precision> Run<'a, R> {
         let mut data = FrameData {
             displacement: self.in_si(&self.state.u, scale.length),
             velocity: self.in_si(&self.state.v, scale.velocity()),
-            stresses: self.stresses(),
             ..FrameData::default()
         };
+        if needs.stresses {
+            data.stresses = self.stresses();
+        }
         if needs.energies {
             let energies = self.system.field.element_energies(&self.state.u)?;
             data.energies = energies.into_iter().map(|w| w * scale.energy()).collect();
