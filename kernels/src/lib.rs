@@ -10,6 +10,7 @@ extern crate self as tensormass_kernels;
 pub mod batch;
 mod law;
 mod real;
+pub mod shader;
 
 pub use law::{BatchKernels, Law, LawEntry, LawInfo, Operations, ParameterInfo, Structure};
 pub use real::Real;
