@@ -2,7 +2,10 @@
 //!
 //! Integrators and solvers are written once over these traits; where the vectors live and who computes on them is a
 //! backend's affair. Vectors have three components a node. Scalars that a backend returns are `f64`, summed in a fixed
-//! order.
+//! order. To return one, a device has to be waited for; a solver that needs scalars in every iteration keeps them in
+//! [`Backend::Registers`], where the vectors live, and gives its recurrences as [`Update`]s.
+
+use crate::device::DeviceError;
 
 /// An element has left the domain of its law: the state is not one that the law describes.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -16,10 +19,60 @@ pub struct LeftDomain {
     pub domain: String,
 }
 
+/// A number of a solver's recurrences: `f64` on the host, or a device's own.
+pub trait Scalar:
+    Copy
+    + std::ops::Add<Output = Self>
+    + std::ops::Sub<Output = Self>
+    + std::ops::Mul<Output = Self>
+    + std::ops::Div<Output = Self>
+{
+    /// A constant.
+    fn number(x: f64) -> Self;
+    /// `then` where left > right, `otherwise` elsewhere; both are evaluated.
+    fn select_greater(left: Self, right: Self, then: Self, otherwise: Self) -> Self;
+}
+
+impl Scalar for f64 {
+    fn number(x: f64) -> Self {
+        x
+    }
+    fn select_greater(left: Self, right: Self, then: Self, otherwise: Self) -> Self {
+        if left > right { then } else { otherwise }
+    }
+}
+
+/// Numbers of [`Backend::Registers`].
+pub const REGISTERS: usize = 16;
+/// The register that stops a solver: where it is 0, [`Backend::descend`], [`Backend::turn`], [`ForceField::product`] and
+/// updates that heed it do nothing.
+pub const RUNNING: usize = 0;
+/// The register that receives a sum for the next update: of [`ForceField::product`] or [`Backend::descend`].
+pub const SUM: usize = 1;
+/// The factor of [`Backend::descend`].
+pub const ALPHA: usize = 2;
+/// The factor of [`Backend::turn`].
+pub const BETA: usize = 3;
+
+/// One step of a solver's recurrences on its registers, written once for every backend.
+///
+/// There is no control flow: what depends on a condition is a [`Scalar::select_greater`]. Backends may compute in f32,
+/// and need not tell NaN from other numbers.
+pub trait Update: 'static {
+    /// Whether it reads [`SUM`].
+    const SUMS: bool;
+    /// Changes the registers.
+    fn apply<S: Scalar>(registers: &mut [S; REGISTERS]);
+}
+
 /// Vectors over the nodes of a body, and their arithmetic.
+///
+/// A device may fail at any time. Numbers that it returns from then on are NaN, and [`Backend::check`] says why.
 pub trait Backend {
     /// Three components a node.
     type Vector;
+    /// [`REGISTERS`] numbers of a solver, where the vectors live.
+    type Registers;
 
     /// A vector of zeros.
     fn zeros(&self) -> Self::Vector;
@@ -47,25 +100,118 @@ pub trait Backend {
     fn max_abs(&self, x: &Self::Vector) -> f64;
     /// Sets the constrained components to 0.
     fn project(&self, x: &mut Self::Vector);
-    /// Sets the constrained components to these values, in the constraints' order.
-    fn impose(&self, values: &[f64], x: &mut Self::Vector);
-    /// Sets the constrained components of y to these values minus those of x, in the constraints' order.
-    fn impose_change(&self, values: &[f64], x: &Self::Vector, y: &mut Self::Vector);
+    /// Sets each constrained component to the value of the motion that it follows.
+    fn impose(&self, motions: &[f64], x: &mut Self::Vector);
+    /// Sets each constrained component of y to the value of the motion that it follows minus the component of x.
+    fn impose_change(&self, motions: &[f64], x: &Self::Vector, y: &mut Self::Vector);
     /// Replaces components that are not positive by their magnitude, and 0 by 1.
     fn make_positive(&self, x: &mut Self::Vector);
     /// The unit round-off of the backend's precision.
     fn epsilon(&self) -> f64;
+    /// The smallest normal number of the backend's registers.
+    fn smallest(&self) -> f64;
+
+    /// Registers with these values.
+    fn registers(&self, values: [f64; REGISTERS]) -> Self::Registers;
+    /// Sets all registers.
+    fn load(&self, values: [f64; REGISTERS], registers: &mut Self::Registers);
+    /// The values of all registers: waits for the device.
+    fn read(&self, registers: &Self::Registers) -> [f64; REGISTERS];
+    /// registers\[k\] = the sum of x_i y_i.
+    fn dot_to(&self, x: &Self::Vector, y: &Self::Vector, registers: &mut Self::Registers, k: usize);
+    /// Applies an update to the registers.
+    fn update<U: Update>(&self, registers: &mut Self::Registers);
+    /// One descent of a conjugate gradient along d, with a = [`ALPHA`]: x += a d, r -= a q, z = r / D, and the sum of
+    /// r_i z_i for the next update.
+    fn descend(&self, descent: Descent<Self>, registers: &mut Self::Registers)
+    where
+        Self: Sized;
+    /// The next direction of a conjugate gradient: d = z + b d with b = [`BETA`].
+    fn turn(&self, z: &Self::Vector, d: &mut Self::Vector, registers: &Self::Registers);
+    /// How many iterations a solver does well to take between two readings of its registers.
+    fn iterations_between_readings(&self) -> u32;
+
+    /// What the backend runs on.
+    fn name(&self) -> String;
+    /// What the device was asked to do so far.
+    fn counts(&self) -> Counts;
+    /// Whether the device still works: numbers returned before a successful check are good.
+    ///
+    /// # Errors
+    /// The first fault of the device.
+    fn check(&self) -> Result<(), DeviceError>;
+}
+
+/// The vectors of [`Backend::descend`].
+pub struct Descent<'a, B: Backend> {
+    /// The direction.
+    pub d: &'a B::Vector,
+    /// A d.
+    pub q: &'a B::Vector,
+    /// The preconditioner D.
+    pub preconditioner: &'a B::Vector,
+    /// The solution.
+    pub x: &'a mut B::Vector,
+    /// The residual.
+    pub r: &'a mut B::Vector,
+    /// D^-1 r.
+    pub z: &'a mut B::Vector,
+}
+
+/// What a device was asked to do; all 0 where there is no device to be waited for.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Kernels started.
+    pub dispatches: u64,
+    /// Lists of kernels handed over.
+    pub submissions: u64,
+    /// Times that results were waited for and read.
+    pub readbacks: u64,
+    /// Bytes read.
+    pub bytes_read: u64,
+}
+
+/// A = mass M + stiffness K at the state to which a field is prepared; M is diagonal.
+pub struct Operator<'a, B: Backend> {
+    /// Lumped masses, one entry a component.
+    pub masses: &'a B::Vector,
+    /// Factor m of M.
+    pub mass: f64,
+    /// Factor k of K.
+    pub stiffness: f64,
+}
+
+impl<B: Backend> Operator<'_, B> {
+    /// y = A x, constrained components set to 0.
+    pub fn apply(&self, backend: &B, field: &mut impl ForceField<B>, x: &B::Vector, y: &mut B::Vector) {
+        backend.clear(y);
+        // add_dforce adds -K x.
+        field.add_dforce(backend, x, -self.stiffness, y);
+        if self.mass != 0.0 {
+            backend.multiply_add(self.mass, self.masses, x, y);
+        }
+        backend.project(y);
+    }
+
+    /// d = diag A.
+    pub fn diagonal(&self, backend: &B, field: &mut impl ForceField<B>, d: &mut B::Vector) {
+        backend.clear(d);
+        field.add_diagonal(backend, self.stiffness, d);
+        backend.axpy(self.mass, self.masses, d);
+    }
 }
 
 /// Forces that derive from a potential: the elements of a body.
 ///
 /// K is the tangent stiffness, K = -df/du at the state given to [`ForceField::prepare`].
 pub trait ForceField<B: Backend> {
-    /// The potential energy at displacement u.
+    /// The strain energy of each element at displacement u, in the mesh's numbering.
     ///
     /// # Errors
     /// An element is outside its law's domain.
-    fn potential_energy(&mut self, backend: &B, u: &B::Vector) -> Result<f64, LeftDomain>;
+    fn element_energies(&mut self, backend: &B, u: &B::Vector) -> Result<Vec<f64>, LeftDomain>;
+    /// The Cauchy stress of each element at displacement u, in the mesh's numbering, 9 components row by row.
+    fn cauchy(&mut self, backend: &B, u: &B::Vector) -> Vec<[f64; 9]>;
     /// f += the forces at displacement u.
     ///
     /// # Errors
@@ -77,4 +223,21 @@ pub trait ForceField<B: Backend> {
     fn add_dforce(&mut self, backend: &B, du: &B::Vector, factor: f64, df: &mut B::Vector);
     /// d += factor times the diagonal of K.
     fn add_diagonal(&mut self, backend: &B, factor: f64, d: &mut B::Vector);
+    /// y = A x, constrained components set to 0, and the sum of x_i y_i for the next update.
+    fn product(
+        &mut self,
+        backend: &B,
+        operator: &Operator<B>,
+        x: &B::Vector,
+        y: &mut B::Vector,
+        registers: &mut B::Registers,
+    );
+
+    /// The potential energy at displacement u.
+    ///
+    /// # Errors
+    /// An element is outside its law's domain.
+    fn potential_energy(&mut self, backend: &B, u: &B::Vector) -> Result<f64, LeftDomain> {
+        Ok(self.element_energies(backend, u)?.iter().sum())
+    }
 }

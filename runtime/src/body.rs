@@ -21,7 +21,7 @@ pub struct LawBatch {
 }
 
 /// A component of displacement that is imposed.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub struct Constraint {
     /// The node.
     pub node: u32,
@@ -68,10 +68,9 @@ pub struct Body {
 }
 
 impl Body {
-    /// Imposed displacements at a time, in the order of the constraints.
-    pub fn imposed(&self, time: f64) -> Vec<f64> {
-        let values: Vec<f64> = self.motions.iter().map(|m| m.at(time)).collect();
-        self.constraints.iter().map(|c| values[c.motion]).collect()
+    /// The displacement of each motion at a time.
+    pub fn motions_at(&self, time: f64) -> Vec<f64> {
+        self.motions.iter().map(|m| m.at(time)).collect()
     }
 
     /// Whether every law is linear.

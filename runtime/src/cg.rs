@@ -4,37 +4,7 @@
 //! iteration cap, and exits for negative curvature and stagnation. Norms are those of the preconditioner,
 //! rho = r . D^-1 r: a plain 2-norm judges badly where stiffnesses differ (Jacobi's D = diag A).
 
-use crate::backend::{Backend, ForceField};
-
-/// A = mass M + stiffness K at the state to which the field is prepared; M is diagonal.
-pub struct Operator<'a, B: Backend> {
-    /// Lumped masses, one entry a component.
-    pub masses: &'a B::Vector,
-    /// Factor m of M.
-    pub mass: f64,
-    /// Factor k of K.
-    pub stiffness: f64,
-}
-
-impl<B: Backend> Operator<'_, B> {
-    /// y = A x, constrained components set to 0.
-    pub fn apply(&self, backend: &B, field: &mut impl ForceField<B>, x: &B::Vector, y: &mut B::Vector) {
-        backend.clear(y);
-        // add_dforce adds -K x.
-        field.add_dforce(backend, x, -self.stiffness, y);
-        if self.mass != 0.0 {
-            backend.multiply_add(self.mass, self.masses, x, y);
-        }
-        backend.project(y);
-    }
-
-    /// d = diag A.
-    pub fn diagonal(&self, backend: &B, field: &mut impl ForceField<B>, d: &mut B::Vector) {
-        backend.clear(d);
-        field.add_diagonal(backend, self.stiffness, d);
-        backend.axpy(self.mass, self.masses, d);
-    }
-}
+use crate::backend::{ALPHA, BETA, Backend, Descent, ForceField, Operator, REGISTERS, RUNNING, SUM, Scalar, Update};
 
 /// When to stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,24 +45,113 @@ pub struct CgReport {
 /// residual stays level, or rises, for hundreds of iterations while they do.
 const PATIENCE: u32 = 50;
 
+/// rho = r . D^-1 r.
+const RHO: usize = 4;
+/// Of b alone; from [`Start`] on the larger of it and the first rho.
+const REFERENCE: usize = 5;
+/// rho at which the solution is good enough; the squared tolerance before [`Start`].
+const TARGET: usize = 6;
+/// What all iterations took off the squared error in the norm of A.
+const GAINED: usize = 7;
+/// Iterations in a row that took off next to nothing.
+const SINCE: usize = 8;
+/// The part of [`GAINED`] that is next to nothing.
+const NEGLIGIBLE: usize = 9;
+/// Iterations taken.
+const ITERATIONS: usize = 10;
+/// One of the codes below.
+const OUTCOME: usize = 11;
+/// The smallest number that registers tell from 0.
+const SMALLEST: usize = 12;
+
+const CONVERGED: f64 = 1.0;
+const NEGATIVE_CURVATURE: f64 = 2.0;
+const STAGNATED: f64 = 3.0;
+
+/// The value in a register's place where the solver runs.
+fn running<S: Scalar>(s: &[S; REGISTERS], k: usize, value: S) -> S {
+    S::select_greater(s[RUNNING], S::number(0.0), value, s[k])
+}
+
+/// Stops the solver with an outcome where it runs and left > right.
+fn stop_if_greater<S: Scalar>(s: &mut [S; REGISTERS], left: S, right: S, outcome: f64) {
+    let code = S::select_greater(left, right, S::number(outcome), s[OUTCOME]);
+    s[OUTCOME] = running(s, OUTCOME, code);
+    s[RUNNING] = S::select_greater(left, right, S::number(0.0), s[RUNNING]);
+}
+
+/// From the residuals of x as given and of x = 0: the norm to reach.
+struct Start;
+
+impl Update for Start {
+    const SUMS: bool = false;
+    fn apply<S: Scalar>(s: &mut [S; REGISTERS]) {
+        s[REFERENCE] = S::select_greater(s[RHO], s[REFERENCE], s[RHO], s[REFERENCE]);
+        s[TARGET] = s[TARGET] * s[REFERENCE];
+        let (target, rho) = (s[TARGET], s[RHO]);
+        stop_if_greater(s, target, rho, CONVERGED);
+        let (smallest, reference) = (s[SMALLEST], s[REFERENCE]);
+        stop_if_greater(s, smallest, reference, CONVERGED);
+    }
+}
+
+/// From d . A d: how far to go along d.
+struct Advance;
+
+impl Update for Advance {
+    const SUMS: bool = true;
+    fn apply<S: Scalar>(s: &mut [S; REGISTERS]) {
+        let (zero, one) = (S::number(0.0), S::number(1.0));
+        s[ITERATIONS] = running(s, ITERATIONS, s[ITERATIONS] + one);
+        let positive = S::select_greater(s[SUM], zero, one, zero);
+        stop_if_greater(s, one, positive, NEGATIVE_CURVATURE);
+        let curvature = S::select_greater(s[SUM], zero, s[SUM], one);
+        s[ALPHA] = s[RHO] / curvature;
+    }
+}
+
+/// From the new r . D^-1 r: whether to go on, and how far to turn.
+struct Judge;
+
+impl Update for Judge {
+    const SUMS: bool = true;
+    fn apply<S: Scalar>(s: &mut [S; REGISTERS]) {
+        // What an iteration takes off the squared error in the norm of A.
+        let gain = s[ALPHA] * s[RHO];
+        s[GAINED] = running(s, GAINED, s[GAINED] + gain);
+        let since = s[SINCE] + S::number(1.0);
+        let since = S::select_greater(gain, s[NEGLIGIBLE] * s[GAINED], S::number(0.0), since);
+        s[SINCE] = running(s, SINCE, since);
+        s[BETA] = s[SUM] / s[RHO];
+        s[RHO] = running(s, RHO, s[SUM]);
+        let (target, rho) = (s[TARGET], s[RHO]);
+        stop_if_greater(s, target, rho, CONVERGED);
+        stop_if_greater(s, since, S::number(f64::from(PATIENCE)), STAGNATED);
+    }
+}
+
 /// Work vectors, kept between solutions.
 pub struct ConjugateGradient<B: Backend> {
     r: B::Vector,
     z: B::Vector,
     d: B::Vector,
     q: B::Vector,
+    registers: B::Registers,
 }
 
 impl<B: Backend> ConjugateGradient<B> {
     /// Work vectors for a body.
     pub fn new(backend: &B) -> Self {
-        Self { r: backend.zeros(), z: backend.zeros(), d: backend.zeros(), q: backend.zeros() }
+        let [r, z, d, q] = std::array::from_fn(|_| backend.zeros());
+        Self { r, z, d, q, registers: backend.registers([0.0; REGISTERS]) }
     }
 
     /// Solves A x = b for the free components of x; its constrained components are given and kept.
     ///
     /// `preconditioner` is D of the norm rho = r . D^-1 r; all its components are positive. The residual is compared to
-    /// the larger of those of x as given and of x = 0 in the free components.
+    /// the larger of those of x as given and of x = 0 in the free components. Everything from the first product to the
+    /// break tests happens where the vectors live; the host reads the registers once for
+    /// [`Backend::iterations_between_readings`] iterations, and those after the last do nothing.
     pub fn solve(
         &mut self,
         backend: &B,
@@ -103,52 +162,50 @@ impl<B: Backend> ConjugateGradient<B> {
         x: &mut B::Vector,
         limits: CgLimits,
     ) -> CgReport {
-        let Self { r, z, d, q } = self;
+        let Self { r, z, d, q, registers } = self;
+        let mut first = [0.0; REGISTERS];
+        first[RUNNING] = 1.0;
+        first[TARGET] = limits.tolerance * limits.tolerance;
+        first[NEGLIGIBLE] = backend.epsilon() * backend.epsilon();
+        first[SMALLEST] = backend.smallest();
+        backend.load(first, registers);
         backend.copy(b, r);
         backend.project(r);
         backend.divide(r, preconditioner, z);
-        let of_b = backend.dot(r, z);
-        operator.apply(backend, field, x, q);
+        backend.dot_to(r, z, registers, REFERENCE);
+        field.product(backend, operator, x, q, registers);
         backend.axpy(-1.0, q, r);
         backend.divide(r, preconditioner, z);
-        let mut rho = backend.dot(r, z);
-        let reference = rho.max(of_b);
-        let target = limits.tolerance * limits.tolerance * reference;
-        let report = |outcome, iterations, rho: f64| CgReport {
-            outcome,
-            iterations,
-            residual: if reference > 0.0 { (rho / reference).sqrt() } else { 0.0 },
-        };
-        if rho <= target || reference == 0.0 {
-            return report(CgOutcome::Converged, 0, rho);
-        }
+        backend.dot_to(r, z, registers, RHO);
+        backend.update::<Start>(registers);
         backend.copy(z, d);
-        // alpha rho is what an iteration takes off the squared error in the norm of A.
-        let (mut gained, mut since) = (0.0, 0);
-        let negligible = backend.epsilon() * backend.epsilon();
-        for iteration in 1..=limits.max_iterations {
-            operator.apply(backend, field, d, q);
-            let curvature = backend.dot(d, q);
-            if curvature <= 0.0 || curvature.is_nan() {
-                return report(CgOutcome::NegativeCurvature, iteration, rho);
+        let mut left = limits.max_iterations;
+        loop {
+            let now = left.min(backend.iterations_between_readings());
+            for _ in 0..now {
+                field.product(backend, operator, d, q, registers);
+                backend.update::<Advance>(registers);
+                backend.descend(Descent { d, q, preconditioner, x, r, z }, registers);
+                backend.update::<Judge>(registers);
+                backend.turn(z, d, registers);
             }
-            let alpha = rho / curvature;
-            backend.axpy(alpha, d, x);
-            backend.axpy(-alpha, q, r);
-            backend.divide(r, preconditioner, z);
-            let next = backend.dot(r, z);
-            if next <= target {
-                return report(CgOutcome::Converged, iteration, next);
+            left -= now;
+            let s = backend.read(registers);
+            // A device that has failed reads NaN: there is nothing to go on with.
+            if left == 0 || !(s[RUNNING] > 0.0) {
+                return report(&s);
             }
-            gained += alpha * rho;
-            since = if alpha * rho > negligible * gained { 0 } else { since + 1 };
-            if since > PATIENCE {
-                return report(CgOutcome::Stagnated, iteration, next);
-            }
-            let beta = next / rho;
-            rho = next;
-            backend.xpby(z, beta, d);
         }
-        report(CgOutcome::IterationCap, limits.max_iterations, rho)
     }
+}
+
+fn report(s: &[f64; REGISTERS]) -> CgReport {
+    let outcome = match s[OUTCOME] {
+        CONVERGED => CgOutcome::Converged,
+        NEGATIVE_CURVATURE => CgOutcome::NegativeCurvature,
+        STAGNATED => CgOutcome::Stagnated,
+        _ => CgOutcome::IterationCap,
+    };
+    let residual = if s[REFERENCE] > 0.0 { (s[RHO] / s[REFERENCE]).sqrt() } else { 0.0 };
+    CgReport { outcome, iterations: s[ITERATIONS] as u32, residual }
 }

@@ -100,20 +100,19 @@ pub fn run(scene: &Scene, out: Option<&Path>, observer: &mut (dyn Observer + Sen
         .build()
         .map_err(|e| RunError::Threads { threads, reason: e.to_string() })?;
     pool.install(|| match scene.solver.precision {
-        scene::Precision::F32 => Run::<f32>::new(scene, model).all(out, observer),
-        scene::Precision::F64 => Run::<f64>::new(scene, model).all(out, observer),
+        scene::Precision::F32 => on_cpu::<f32>(scene, model, out, observer),
+        scene::Precision::F64 => on_cpu::<f64>(scene, model, out, observer),
     })
 }
 
-type Cpu<R> = System<CpuBackend<R>, CpuField<R>>;
-type Stepper<R> = Box<dyn Integrator<CpuBackend<R>, CpuField<R>>>;
+type Stepper<B, F> = Box<dyn Integrator<B, F>>;
 
-struct Run<'a, R: Precision> {
+struct Run<'a, B: Backend, F: ForceField<B>> {
     scene: &'a Scene,
     model: Model,
-    system: Cpu<R>,
-    state: State<CpuBackend<R>>,
-    integrator: Stepper<R>,
+    system: System<B, F>,
+    state: State<B>,
+    integrator: Stepper<B, F>,
     /// Step length and number of steps, scaled units.
     step: f64,
     steps: u64,
@@ -122,14 +121,23 @@ struct Run<'a, R: Precision> {
     limits: Option<StepLimits>,
 }
 
-impl<'a, R: Precision> Run<'a, R> {
-    fn new(scene: &'a Scene, mut model: Model) -> Self {
+/// Runs a scene on the CPU.
+fn on_cpu<R: Precision>(
+    scene: &Scene,
+    model: Model,
+    out: Option<&Path>,
+    observer: &mut (dyn Observer + Send),
+) -> Result<Outcome, RunError> {
+    let body = &model.body;
+    let backend = CpuBackend::<R>::new(body.masses.len(), body.constraints.clone());
+    let field = CpuField::<R>::new(body);
+    Run::new(scene, model, backend, field).all(out, observer)
+}
+
+impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
+    fn new(scene: &'a Scene, mut model: Model, backend: B, field: F) -> Self {
         let body = model.body.clone();
-        let nodes = body.masses.len();
-        let constrained = body.constraints.iter().map(|c| (c.node, c.component)).collect();
-        let backend = CpuBackend::<R>::new(nodes, constrained);
-        let field = CpuField::<R>::new(&body);
-        let integrator = integrator::<R>(scene, &backend, nodes);
+        let integrator = integrator(scene, &backend, body.masses.len());
         let (seconds, steps) = stepping(scene);
         let system = System::new(backend, field, body);
         let state = system.initial_state(model.velocity);
@@ -157,7 +165,7 @@ impl<'a, R: Precision> Run<'a, R> {
             observer.warning(warning);
         }
         let ending = match self.record(&mut results)? {
-            Err(e) => Ending::Failed(e.into()),
+            Err(e) => Ending::Failed(e),
             Ok(()) => self.step_through(&mut results, observer)?,
         };
         if ending != Ending::Done
@@ -190,6 +198,8 @@ impl<'a, R: Precision> Run<'a, R> {
     ) -> Result<Ending, RunError> {
         for k in 1..=self.steps {
             let stepped = self.integrator.step(&mut self.system, &mut self.state, self.step);
+            // What a failed device did to a solver is not the reason.
+            let stepped = self.system.backend.check().map_err(SolveError::from).and(stepped);
             let done = stepped.and_then(|report| {
                 self.cost += report;
                 self.state.step = k;
@@ -201,7 +211,7 @@ impl<'a, R: Precision> Run<'a, R> {
                 return Ok(Ending::Failed(e));
             }
             if let Err(e) = self.record(results)? {
-                return Ok(Ending::Failed(e.into()));
+                return Ok(Ending::Failed(e));
             }
             observer.progress(k, self.steps);
             if k < self.steps && observer.interrupted() {
@@ -239,7 +249,7 @@ impl<'a, R: Precision> Run<'a, R> {
     }
 
     /// Records probes, and a frame where the scene wants one.
-    fn record(&mut self, results: &mut Results) -> Result<Result<(), LeftDomain>, OutputError> {
+    fn record(&mut self, results: &mut Results) -> Result<Result<(), SolveError>, OutputError> {
         let snapshot = match self.snapshot(self.model.recorder.needs()) {
             Ok(snapshot) => snapshot,
             Err(e) => return Ok(Err(e)),
@@ -263,7 +273,7 @@ impl<'a, R: Precision> Run<'a, R> {
         Ok(Ok(()))
     }
 
-    fn snapshot(&mut self, needs: Needs) -> Result<Snapshot, LeftDomain> {
+    fn snapshot(&mut self, needs: Needs) -> Result<Snapshot, SolveError> {
         let scale = self.model.scale;
         let mut snapshot = Snapshot { displacement: self.in_si(&self.state.u, scale.length), ..Snapshot::default() };
         if needs.reactions {
@@ -277,10 +287,11 @@ impl<'a, R: Precision> Run<'a, R> {
         if needs.stresses {
             snapshot.stresses = self.stresses();
         }
+        self.system.backend.check()?;
         Ok(snapshot)
     }
 
-    fn frame(&mut self, needs: Needs) -> Result<FrameData, LeftDomain> {
+    fn frame(&mut self, needs: Needs) -> Result<FrameData, SolveError> {
         let scale = self.model.scale;
         let mut data = FrameData {
             displacement: self.in_si(&self.state.u, scale.length),
@@ -291,17 +302,23 @@ impl<'a, R: Precision> Run<'a, R> {
             data.stresses = self.stresses();
         }
         if needs.energies {
-            let energies = self.system.field.element_energies(&self.state.u)?;
+            let energies = self.system.field.element_energies(&self.system.backend, &self.state.u)?;
             data.energies = energies.into_iter().map(|w| w * scale.energy()).collect();
         } else {
             data.energies = vec![f64::NAN; self.system.body.elements.len()];
         }
+        self.system.backend.check()?;
         Ok(data)
     }
 
-    fn stresses(&self) -> Vec<[f64; 9]> {
+    fn stresses(&mut self) -> Vec<[f64; 9]> {
         let stress = self.model.scale.stress;
-        self.system.field.cauchy(&self.state.u).into_iter().map(|s| s.map(|x| x * stress)).collect()
+        self.system
+            .field
+            .cauchy(&self.system.backend, &self.state.u)
+            .into_iter()
+            .map(|s| s.map(|x| x * stress))
+            .collect()
     }
 
     fn energies(&mut self) -> Result<Energies, LeftDomain> {
@@ -315,7 +332,7 @@ impl<'a, R: Precision> Run<'a, R> {
         })
     }
 
-    fn in_si(&self, x: &Vec<[R; 3]>, unit: f64) -> Vec<[f64; 3]> {
+    fn in_si(&self, x: &B::Vector, unit: f64) -> Vec<[f64; 3]> {
         self.system.backend.download(x).into_iter().map(|v| v.map(|c| c * unit)).collect()
     }
 
@@ -339,7 +356,7 @@ impl<'a, R: Precision> Run<'a, R> {
             "title": self.scene.scene.title,
             "status": status,
             "error": error,
-            "device": "cpu",
+            "device": self.system.backend.name(),
             "precision": precision_name(self.scene.solver.precision),
             "integrator": integrator_name(self.scene.solver.integrator),
             "nodes": self.model.mesh.nodes().len(),
@@ -439,7 +456,11 @@ fn ramps_end(scene: &Scene) -> f64 {
     loads.chain(motions).fold(0.0, f64::max)
 }
 
-fn integrator<R: Precision>(scene: &Scene, backend: &CpuBackend<R>, nodes: usize) -> Stepper<R> {
+fn integrator<B: Backend + 'static, F: ForceField<B> + 'static>(
+    scene: &Scene,
+    backend: &B,
+    nodes: usize,
+) -> Stepper<B, F> {
     let solver = &scene.solver;
     let settings = SolverSettings {
         cg: CgLimits { tolerance: solver.cg.tolerance, max_iterations: solver.cg.max_iterations },

@@ -2,6 +2,7 @@
 
 use crate::backend::{Backend, ForceField, LeftDomain};
 use crate::body::Body;
+use crate::device::DeviceError;
 
 /// Displacement and velocity at a time; positions are never stored.
 pub struct State<B: Backend> {
@@ -30,6 +31,9 @@ pub enum SolveError {
         /// The largest difference of displacements over the body's diameter.
         largest: f64,
     },
+    /// The device failed.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
     /// A linear or nonlinear solver gave up.
     #[error(
         "the {solver} solver did not converge: relative residual {residual:.3e} after {iterations} iterations, wanted \
@@ -78,7 +82,7 @@ impl<B: Backend, F: ForceField<B>> System<B, F> {
     /// The state at rest with this velocity everywhere, imposed components at their time-0 values.
     pub fn initial_state(&self, velocity: [f64; 3]) -> State<B> {
         let mut u = self.backend.zeros();
-        self.backend.impose(&self.body.imposed(0.0), &mut u);
+        self.backend.impose(&self.body.motions_at(0.0), &mut u);
         let mut v = self.backend.upload(&vec![velocity; self.body.masses.len()]);
         self.backend.project(&mut v);
         State { u, v, time: 0.0, step: 0 }
@@ -118,13 +122,15 @@ impl<B: Backend, F: ForceField<B>> System<B, F> {
         self.backend.dot(&p, v)
     }
 
-    /// Refuses a state that has grown beyond all bounds.
+    /// Refuses a state that has grown beyond all bounds, or that a failed device returned.
     ///
     /// # Errors
-    /// [`SolveError::Diverged`].
+    /// [`SolveError::Diverged`], [`SolveError::Device`].
     pub fn check_bounded(&self, state: &State<B>) -> Result<(), SolveError> {
         let limit = DIVERGED * self.body.diameter;
-        if self.backend.max_abs(&state.u) < limit {
+        let largest = self.backend.max_abs(&state.u);
+        self.backend.check()?;
+        if largest < limit {
             return Ok(());
         }
         // Far from home: spread out, or only moved?

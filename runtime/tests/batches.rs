@@ -173,11 +173,11 @@ fn forces(model: &Model, u: &[[f64; 3]]) -> (Vec<[f64; 3]>, Vec<f64>, Vec<[f64; 
     let mut f = system.backend.zeros();
     system.field.add_force(&system.backend, &scaled, &mut f).unwrap_or_else(|e| panic!("{e}"));
     let (force, energy, stress) = (model.scale.force(), model.scale.energy(), model.scale.stress);
-    let energies = system.field.element_energies(&scaled).unwrap_or_else(|e| panic!("{e}"));
+    let energies = system.field.element_energies(&system.backend, &scaled).unwrap_or_else(|e| panic!("{e}"));
     (
         f.iter().map(|f| f.map(|x| x * force)).collect(),
         energies.iter().map(|w| w * energy).collect(),
-        system.field.cauchy(&scaled).iter().map(|s| s.map(|x| x * stress)).collect(),
+        system.field.cauchy(&system.backend, &scaled).iter().map(|s| s.map(|x| x * stress)).collect(),
     )
 }
 

@@ -3,8 +3,8 @@
 mod support;
 
 use support::{Cpu, Random, body, done, outcome, parameters, scene, system};
-use tensormass_runtime::backend::{Backend, ForceField};
-use tensormass_runtime::cg::{CgLimits, CgOutcome, CgReport, ConjugateGradient, Operator};
+use tensormass_runtime::backend::{Backend, ForceField, Operator};
+use tensormass_runtime::cg::{CgLimits, CgOutcome, CgReport, ConjugateGradient};
 use tensormass_runtime::cpu::Precision;
 use tensormass_runtime::laws;
 use tensormass_runtime::mesh::beam;

@@ -67,7 +67,7 @@ fn check<R: Precision>(patch: &Patch, law: &'static LawEntry, tolerance: f64, pl
     let mut random = Random(3);
     let start: Vec<[f64; 3]> = nodes.iter().map(|_| random.vector(0.03)).collect();
     state.u = system.backend.upload(&start);
-    system.backend.impose(&system.body.imposed(0.0), &mut state.u);
+    system.backend.impose(&system.body.motions_at(0.0), &mut state.u);
     let mut statics = Statics::new(&system.backend, nodes.len(), settings);
     let report = statics.step(&mut system, &mut state, 1.0).unwrap_or_else(|e| panic!("{name}: {e}"));
     let u = system.backend.download(&state.u);
@@ -90,7 +90,7 @@ fn check<R: Precision>(patch: &Patch, law: &'static LawEntry, tolerance: f64, pl
     let size = sigma.as_flattened().iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     let worst = system
         .field
-        .cauchy(&state.u)
+        .cauchy(&system.backend, &state.u)
         .iter()
         .flat_map(|s| s.iter().zip(sigma.as_flattened()).map(|(a, b)| (a - b).abs()))
         .fold(0.0, f64::max);

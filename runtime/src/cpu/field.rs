@@ -9,7 +9,7 @@ use tensormass_kernels::BatchKernels;
 use tensormass_kernels::batch::{Batch, RestElement};
 
 use super::{CpuBackend, Precision};
-use crate::backend::{Backend, ForceField, LeftDomain};
+use crate::backend::{Backend, ForceField, LeftDomain, Operator, REGISTERS, RUNNING, SUM};
 use crate::body::{Body, LawBatch};
 use crate::mesh::{Incidence, NodeId};
 
@@ -148,12 +148,10 @@ impl<R: Precision> CpuField<R> {
             }
         });
     }
+}
 
-    /// The strain energy of each element, in the mesh's numbering.
-    ///
-    /// # Errors
-    /// An element is outside its law's domain.
-    pub fn element_energies(&self, u: &[[R; 3]]) -> Result<Vec<f64>, LeftDomain> {
+impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
+    fn element_energies(&mut self, _: &CpuBackend<R>, u: &Vec<[R; 3]>) -> Result<Vec<f64>, LeftDomain> {
         let mut energies = vec![0.0; self.slots.len()];
         for batch in &self.batches {
             let mut out = vec![R::default(); batch.nodes.len()];
@@ -165,8 +163,7 @@ impl<R: Precision> CpuField<R> {
         Ok(energies)
     }
 
-    /// The Cauchy stress of each element, in the mesh's numbering.
-    pub fn cauchy(&self, u: &[[R; 3]]) -> Vec<[f64; 9]> {
+    fn cauchy(&mut self, _: &CpuBackend<R>, u: &Vec<[R; 3]>) -> Vec<[f64; 9]> {
         let mut stresses = vec![[0.0; 9]; self.slots.len()];
         for batch in &self.batches {
             let mut out = vec![[R::default(); 9]; batch.nodes.len()];
@@ -180,12 +177,6 @@ impl<R: Precision> CpuField<R> {
             }
         }
         stresses
-    }
-}
-
-impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
-    fn potential_energy(&mut self, _: &CpuBackend<R>, u: &Vec<[R; 3]>) -> Result<f64, LeftDomain> {
-        Ok(self.element_energies(u)?.iter().sum())
     }
 
     fn add_force(&mut self, _: &CpuBackend<R>, u: &Vec<[R; 3]>, f: &mut Vec<[R; 3]>) -> Result<(), LeftDomain> {
@@ -215,5 +206,19 @@ impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
         debug_assert!(done.is_ok(), "a diagonal reports no domain");
         self.state = state;
         self.nodes(R::from_f64(factor), d);
+    }
+
+    fn product(
+        &mut self,
+        backend: &CpuBackend<R>,
+        operator: &Operator<CpuBackend<R>>,
+        x: &Vec<[R; 3]>,
+        y: &mut Vec<[R; 3]>,
+        registers: &mut [f64; REGISTERS],
+    ) {
+        if registers[RUNNING] > 0.0 {
+            operator.apply(backend, self, x, y);
+            registers[SUM] = backend.dot(x, y);
+        }
     }
 }

@@ -3,7 +3,9 @@
 use rayon::prelude::*;
 
 use super::Precision;
-use crate::backend::Backend;
+use crate::backend::{ALPHA, BETA, Backend, Counts, Descent, REGISTERS, RUNNING, SUM, Update};
+use crate::body::Constraint;
+use crate::device::DeviceError;
 
 /// Nodes a block: a block's partial sum is formed by one thread, blocks are added in order.
 const BLOCK: usize = 4096;
@@ -12,15 +14,14 @@ const BLOCK: usize = 4096;
 #[derive(Debug)]
 pub struct CpuBackend<R> {
     nodes: usize,
-    /// (node, component) of each constrained component, ascending.
-    constrained: Vec<(u32, u8)>,
+    constraints: Vec<Constraint>,
     precision: std::marker::PhantomData<R>,
 }
 
 impl<R: Precision> CpuBackend<R> {
-    /// A backend for a body of `nodes` nodes whose `constrained` components (node, component) are imposed.
-    pub fn new(nodes: usize, constrained: Vec<(u32, u8)>) -> Self {
-        Self { nodes, constrained, precision: std::marker::PhantomData }
+    /// A backend for a body of `nodes` nodes with imposed components.
+    pub fn new(nodes: usize, constraints: Vec<Constraint>) -> Self {
+        Self { nodes, constraints, precision: std::marker::PhantomData }
     }
 
     fn each(&self, x: &[[R; 3]], y: &mut [[R; 3]], f: impl Fn(&[R; 3], &mut [R; 3]) + Sync) {
@@ -43,6 +44,7 @@ impl<R: Precision> CpuBackend<R> {
 
 impl<R: Precision> Backend for CpuBackend<R> {
     type Vector = Vec<[R; 3]>;
+    type Registers = [f64; REGISTERS];
 
     fn zeros(&self) -> Self::Vector {
         vec![[R::default(); 3]; self.nodes]
@@ -124,21 +126,21 @@ impl<R: Precision> Backend for CpuBackend<R> {
     }
 
     fn project(&self, x: &mut Self::Vector) {
-        for &(node, c) in &self.constrained {
-            x[node as usize][c as usize] = R::default();
+        for c in &self.constraints {
+            x[c.node as usize][c.component as usize] = R::default();
         }
     }
 
-    fn impose(&self, values: &[f64], x: &mut Self::Vector) {
-        for (&(node, c), &value) in self.constrained.iter().zip(values) {
-            x[node as usize][c as usize] = R::from_f64(value);
+    fn impose(&self, motions: &[f64], x: &mut Self::Vector) {
+        for c in &self.constraints {
+            x[c.node as usize][c.component as usize] = R::from_f64(motions[c.motion]);
         }
     }
 
-    fn impose_change(&self, values: &[f64], x: &Self::Vector, y: &mut Self::Vector) {
-        for (&(node, c), &value) in self.constrained.iter().zip(values) {
-            let (node, c) = (node as usize, c as usize);
-            y[node][c] = R::from_f64(value) - x[node][c];
+    fn impose_change(&self, motions: &[f64], x: &Self::Vector, y: &mut Self::Vector) {
+        for c in &self.constraints {
+            let (node, component) = (c.node as usize, c.component as usize);
+            y[node][component] = R::from_f64(motions[c.motion]) - x[node][component];
         }
     }
 
@@ -152,5 +154,61 @@ impl<R: Precision> Backend for CpuBackend<R> {
 
     fn epsilon(&self) -> f64 {
         R::EPSILON
+    }
+
+    fn smallest(&self) -> f64 {
+        f64::MIN_POSITIVE
+    }
+
+    fn registers(&self, values: [f64; REGISTERS]) -> Self::Registers {
+        values
+    }
+
+    fn load(&self, values: [f64; REGISTERS], registers: &mut Self::Registers) {
+        *registers = values;
+    }
+
+    fn read(&self, registers: &Self::Registers) -> [f64; REGISTERS] {
+        *registers
+    }
+
+    fn dot_to(&self, x: &Self::Vector, y: &Self::Vector, registers: &mut Self::Registers, k: usize) {
+        registers[k] = self.dot(x, y);
+    }
+
+    fn update<U: Update>(&self, registers: &mut Self::Registers) {
+        U::apply(registers);
+    }
+
+    fn descend(&self, descent: Descent<Self>, registers: &mut Self::Registers) {
+        if registers[RUNNING] > 0.0 {
+            let Descent { d, q, preconditioner, x, r, z } = descent;
+            self.axpy(registers[ALPHA], d, x);
+            self.axpy(-registers[ALPHA], q, r);
+            self.divide(r, preconditioner, z);
+            registers[SUM] = self.dot(r, z);
+        }
+    }
+
+    fn turn(&self, z: &Self::Vector, d: &mut Self::Vector, registers: &Self::Registers) {
+        if registers[RUNNING] > 0.0 {
+            self.xpby(z, registers[BETA], d);
+        }
+    }
+
+    fn iterations_between_readings(&self) -> u32 {
+        1
+    }
+
+    fn name(&self) -> String {
+        "cpu".to_string()
+    }
+
+    fn counts(&self) -> Counts {
+        Counts::default()
+    }
+
+    fn check(&self) -> Result<(), DeviceError> {
+        Ok(())
     }
 }

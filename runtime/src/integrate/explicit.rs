@@ -5,7 +5,7 @@ use crate::system::{Integrator, SolveError, State, StepReport, System};
 
 /// Sets imposed components to their values at a time, and their velocity to the mean over the last h.
 fn impose<B: Backend, F: ForceField<B>>(system: &System<B, F>, state: &mut State<B>, time: f64, h: f64) {
-    let (now, before) = (system.body.imposed(time), system.body.imposed(time - h));
+    let (now, before) = (system.body.motions_at(time), system.body.motions_at(time - h));
     let velocity: Vec<f64> = now.iter().zip(&before).map(|(a, b)| (a - b) / h).collect();
     system.backend.impose(&now, &mut state.u);
     system.backend.impose(&velocity, &mut state.v);

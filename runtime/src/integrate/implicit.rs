@@ -28,7 +28,7 @@ impl<B: Backend, F: ForceField<B>> Integrator<B, F> for ImplicitEuler<B> {
         let alpha = system.body.mass_damping;
         let end = state.time + h;
         // Imposed components: the velocity that takes them to their place at the end of the step, minus the old one.
-        let (now, target) = (system.body.imposed(state.time), system.body.imposed(end));
+        let (now, target) = (system.body.motions_at(state.time), system.body.motions_at(end));
         let velocity: Vec<f64> = now.iter().zip(&target).map(|(a, b)| (b - a) / h).collect();
         let backend = &system.backend;
         backend.clear(&mut self.dv);

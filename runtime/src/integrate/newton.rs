@@ -4,8 +4,8 @@
 //! domain, or that makes the residual larger, is taken back by half until it does neither. Norms are those of
 //! D = diag A; a residual at the level of rounding is as good as converged and is reported as such.
 
-use crate::backend::{Backend, ForceField, LeftDomain};
-use crate::cg::{CgLimits, CgOutcome, CgReport, ConjugateGradient, Operator};
+use crate::backend::{Backend, ForceField, LeftDomain, Operator};
+use crate::cg::{CgLimits, CgOutcome, CgReport, ConjugateGradient};
 use crate::scene::Preconditioner;
 use crate::system::{SolveError, StepReport, System};
 

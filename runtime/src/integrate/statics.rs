@@ -30,7 +30,7 @@ impl<B: Backend> Statics<B> {
         to: f64,
         depth: u32,
     ) -> Result<StepReport, SolveError> {
-        let target = system.body.imposed(to);
+        let target = system.body.motions_at(to);
         let backend = &system.backend;
         backend.clear(&mut self.du);
         backend.impose_change(&target, &state.u, &mut self.du);

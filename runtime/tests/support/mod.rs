@@ -159,6 +159,5 @@ pub fn body(mesh: &TetMesh, law: &'static LawEntry, parameters: &[f64], imposed:
 
 /// A body on the CPU.
 pub fn system<R: Precision>(body: Body) -> Cpu<R> {
-    let constrained = body.constraints.iter().map(|c| (c.node, c.component)).collect();
-    System::new(CpuBackend::new(body.masses.len(), constrained), CpuField::new(&body), body)
+    System::new(CpuBackend::new(body.masses.len(), body.constraints.clone()), CpuField::new(&body), body)
 }
