@@ -12,7 +12,10 @@ pub mod body;
 
 pub mod cg;
 pub mod cpu;
+pub mod device;
 mod frames;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod history;
 pub mod integrate;
 pub mod mesh;

@@ -1,6 +1,9 @@
 //! What the physics tests share: reference cases, scenes run in memory, bodies for any law, a random sequence.
 #![allow(dead_code)] // every test links its own copy and uses a part of it
 
+#[cfg(feature = "gpu")]
+pub mod gpu;
+
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
