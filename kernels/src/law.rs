@@ -2,6 +2,7 @@
 
 use crate::batch;
 use crate::real::Real;
+use crate::shader::LawShaders;
 
 /// A constitutive law: point kernels generated from its strain energy density W.
 ///
@@ -152,12 +153,15 @@ pub struct LawEntry {
     pub f32: fn() -> BatchKernels<f32>,
     /// Batched kernels in double precision.
     pub f64: fn() -> BatchKernels<f64>,
+    /// The element passes as WGSL, in single precision.
+    pub shaders: &'static LawShaders,
 }
 
 impl LawEntry {
     /// The entry of a law.
-    pub const fn new<L: Law>(info: &'static LawInfo) -> Self {
-        Self { info, material: L::material, f32: BatchKernels::<f32>::of::<L>, f64: BatchKernels::<f64>::of::<L> }
+    pub const fn new<L: Law>(info: &'static LawInfo, shaders: &'static LawShaders) -> Self {
+        let (f32, f64) = (BatchKernels::<f32>::of::<L>, BatchKernels::<f64>::of::<L>);
+        Self { info, material: L::material, f32, f64, shaders }
     }
 
     /// The constants of a material, checked for length only.

@@ -1,6 +1,8 @@
 //! Printers: text from validated kernels, and expressions for the reader.
 
+mod naming;
 pub mod rust;
+pub mod wgsl;
 
 #[cfg(feature = "derive")]
 pub(crate) fn expression(e: &crate::expr::Expr, quantities: &crate::quantity::Quantities) -> String {

@@ -1,14 +1,13 @@
 //! Prints validated kernels as Rust, generic over the kernel crate's `Real`.
 
-use std::collections::HashSet;
-
 use proc_macro2::{Ident, Literal, Span, TokenStream};
-use quote::{format_ident, quote};
+use quote::{ToTokens, format_ident, quote};
 
 use crate::derivation::Derivation;
 use crate::element::ElementKernels;
 use crate::ir::{Input, Op, Output, Rational, ValidKernel, ValueId};
 use crate::law::ast::{Law, Parameter};
+use crate::print::naming::{self, ValueName, constants, kernel_docs, letter};
 
 /// A law's module: its `Law` type, metadata and point kernels.
 pub fn law_module(law: &Law, derivation: &Derivation, reviewed: bool) -> TokenStream {
@@ -48,8 +47,8 @@ pub fn law_module(law: &Law, derivation: &Derivation, reviewed: bool) -> TokenSt
     }
 }
 
-/// An element's module: its size and its kernels.
-pub fn element_module(element: &ElementKernels) -> TokenStream {
+/// An element's module: its size, its kernels, and `more` items.
+pub fn element_module(element: &ElementKernels, more: &TokenStream) -> TokenStream {
     let module = format_ident!("{}", element.name);
     let docs = doc_comment(element.docs);
     let nodes = plain(element.nodes as usize);
@@ -82,6 +81,7 @@ pub fn element_module(element: &ElementKernels) -> TokenStream {
             /// The gradients of the interpolation functions by the reference coordinates, one row a node.
             pub const REFERENCE_GRADIENTS: [[f64; 3]; #nodes] = [#(#rows),*];
             #(#functions)*
+            #more
         }
     }
 }
@@ -173,31 +173,6 @@ fn material(kernel: &ValidKernel) -> TokenStream {
     }
 }
 
-/// The constants for the reader: `c[0] = mu`, ...
-fn constants(derivation: &Derivation) -> String {
-    let each = derivation.constants.iter().enumerate().map(|(k, c)| format!("`c[{k}] = {c}`"));
-    each.collect::<Vec<_>>().join(", ")
-}
-
-fn kernel_docs(kernel: &ValidKernel) -> String {
-    let c = kernel.count();
-    let what = match kernel.ir().name.as_str() {
-        "energy" => "W, the strain energy density, at G.",
-        "force" => "P = dW/dG, the first Piola-Kirchhoff stress, at G.",
-        "dforce" => "dP = d2W/dG2 : dG at G.",
-        "diagonal" => "n . d2W/dG_i.dG_i. . n at G for i = 0, 1, 2.",
-        "cauchy" => "sigma = P F' / J at G.",
-        "gradient" => "G = sum_j u_j (x) grad Lambda_j; b holds grad Lambda_1, grad Lambda_2, ...",
-        "contract" => "f_j = -w P grad Lambda_j.",
-        "node_gradients" => "grad Lambda_j of every node.",
-        _ => "",
-    };
-    format!(
-        "{what}\n{} additions, {} multiplications, {} divisions, {} functions.",
-        c.additions, c.multiplications, c.divisions, c.functions
-    )
-}
-
 fn arguments(kernel: &ValidKernel) -> Vec<TokenStream> {
     kernel
         .ir()
@@ -216,21 +191,6 @@ fn arguments(kernel: &ValidKernel) -> Vec<TokenStream> {
             }
         })
         .collect()
-}
-
-/// The short name of an input in the text: the field's letter.
-fn letter(role: Input) -> &'static str {
-    match role {
-        Input::Parameters => "parameters",
-        Input::Constants => "c",
-        Input::DisplacementGradient => "g",
-        Input::GradientIncrement => "dg",
-        Input::NodeGradient => "n",
-        Input::NodalDisplacement => "u",
-        Input::ShapeGradients => "b",
-        Input::Weight => "w",
-        Input::StressIn => "p",
-    }
 }
 
 fn argument(role: Input, used: bool) -> Ident {
@@ -304,50 +264,19 @@ fn body(kernel: &ValidKernel, needs_margin: bool) -> TokenStream {
     }
 }
 
-/// An identifier for each value: the derivation's name where it is unique, `v12` elsewhere; inputs in place.
+/// A token for each value: an identifier of its own, or an input in place.
 fn value_names(kernel: &ValidKernel) -> Vec<TokenStream> {
-    let mut taken: HashSet<String> = kernel.ir().inputs.iter().map(|&(r, _)| letter(r).to_string()).collect();
-    kernel
-        .ir()
-        .values
-        .iter()
-        .enumerate()
-        .map(|(i, d)| {
-            if let Op::Input(role, k) = d.op {
-                let array = argument(role, true);
-                let k = plain(k as usize);
-                return if role == Input::Weight { quote!(#array) } else { quote!(#array[#k]) };
-            }
-            let wanted = d.name.as_deref().map(snake_case).filter(|n| !is_reserved(n) && taken.insert(n.clone()));
-            let ident = wanted.map_or_else(|| format_ident!("v{}", i), |n| Ident::new(&n, Span::call_site()));
-            quote!(#ident)
-        })
-        .collect()
-}
-
-/// A valid snake_case identifier: `dF01` and `W_J` become `d_f01` and `w_j`.
-fn snake_case(name: &str) -> String {
-    let mut out = String::new();
-    let mut previous_lower = false;
-    for c in name.chars() {
-        if c.is_ascii_uppercase() {
-            if previous_lower {
-                out.push('_');
-            }
-            out.push(c.to_ascii_lowercase());
-            previous_lower = false;
-        } else {
-            previous_lower = c.is_ascii_lowercase();
-            out.push(if c.is_ascii_alphanumeric() { c } else { '_' });
+    // What parses as an identifier is no keyword.
+    let names = naming::value_names(kernel, |name| syn::parse_str::<Ident>(name).is_ok());
+    let token = |name| match name {
+        ValueName::Input(Input::Weight, _) => argument(Input::Weight, true).into_token_stream(),
+        ValueName::Input(role, k) => {
+            let (array, k) = (argument(role, true), plain(k as usize));
+            quote!(#array[#k])
         }
-    }
-    out
-}
-
-fn is_reserved(name: &str) -> bool {
-    let numbered =
-        name.strip_prefix('v').is_some_and(|rest| !rest.is_empty() && rest.chars().all(|c| c.is_ascii_digit()));
-    numbered || !name.starts_with(|c: char| c.is_ascii_lowercase()) || syn::parse_str::<Ident>(name).is_err()
+        ValueName::Local(name) => Ident::new(&name, Span::call_site()).into_token_stream(),
+    };
+    names.into_iter().map(token).collect()
 }
 
 fn statements(kernel: &ValidKernel, names: &[TokenStream], host: bool) -> Vec<TokenStream> {

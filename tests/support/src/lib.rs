@@ -6,6 +6,7 @@ pub mod point;
 pub mod random;
 pub mod rounding;
 pub mod tensor;
+pub mod wgsl;
 
 /// The generator, without Symbolica.
 pub use tensormass_codegen as codegen;

@@ -1,0 +1,36 @@
+//! Words that no value of a kernel may be named: the language's and those of the texts around the kernel.
+
+/// Keywords, reserved words and predeclared names in lower case; the others cannot be met in snake_case.
+/// WGSL, W3C Candidate Recommendation, sections 15.3, 15.4, 6.9, 6.3.1 and 17.
+const LANGUAGE: &str = "
+    alias break case const const_assert continue continuing default diagnostic discard else enable false fn for if let
+    loop override requires return struct switch true var while
+    abstract active alignas alignof as asm asm_fragment async attribute auto await become cast catch class co_await
+    co_return co_yield coherent column_major common compile compile_fragment concept const_cast consteval constexpr
+    constinit crate debugger decltype delete demote demote_to_helper do dynamic_cast enum explicit export extends extern
+    external fallthrough filter final finally friend from fxgroup get goto groupshared highp impl implements import
+    inline instanceof interface layout lowp macro macro_rules match mediump meta mod module move mut mutable namespace
+    new nil noexcept noinline nointerpolation non_coherent noncoherent noperspective null nullptr of operator package
+    packoffset partition pass patch pixelfragment precise precision premerge priv protected pub public readonly ref
+    regardless register reinterpret_cast require resource restrict self set shared sizeof smooth snorm static
+    static_assert static_cast std subroutine super target template this thread_local throw trait try type typedef typeid
+    typename typeof union unless unorm unsafe unsized use using varying virtual volatile wgsl where with writeonly yield
+    bool i32 u32 f32 f16 f64 array atomic vec2 vec3 vec4 mat2x2 mat2x3 mat2x4 mat3x2 mat3x3 mat3x4 mat4x2 mat4x3 mat4x4
+    vec2i vec3i vec4i vec2u vec3u vec4u vec2f vec3f vec4f vec2h vec3h vec4h ptr sampler sampler_comparison
+    read write read_write function private workgroup uniform storage
+    bitcast all any select abs acos acosh asin asinh atan atanh atan2 ceil clamp cos cosh cross degrees determinant
+    distance dot exp exp2 floor fma fract frexp ldexp length log log2 max min mix modf normalize pow radians reflect
+    refract round saturate sign sin sinh smoothstep sqrt step tan tanh transpose trunc dpdx dpdy fwidth";
+
+/// Functions and variables of the texts around a kernel, except bindings and helpers, which say their own names.
+const OURS: &str = "
+    work_group_size elements_per_invocation main element group groups local shape_gradients nodal_displacement
+    nodal_increment gradient contract node_gradients energy force dforce diagonal cauchy e volume slot node point";
+
+/// Whether a value may have this name.
+pub fn is_free(name: &str) -> bool {
+    // Helpers end in an underscore, structures of results in that word; two underscores at the beginning are reserved.
+    let of_form = !name.ends_with('_') && !name.ends_with("_result") && !name.starts_with("__");
+    let taken = LANGUAGE.split_whitespace().chain(OURS.split_whitespace()).any(|word| word == name);
+    of_form && !taken && super::binding::BINDINGS.iter().all(|b| b.variable() != name)
+}
