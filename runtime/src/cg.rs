@@ -209,3 +209,10 @@ fn report(s: &[f64; REGISTERS]) -> CgReport {
     let residual = if s[REFERENCE] > 0.0 { (s[RHO] / s[REFERENCE]).sqrt() } else { 0.0 };
     CgReport { outcome, iterations: s[ITERATIONS] as u32, residual }
 }
+
+/// The updates as modules for a GPU, with their names.
+#[cfg(feature = "gpu")]
+pub(crate) fn updates() -> Vec<(String, String)> {
+    use crate::gpu::update_module;
+    vec![update_module::<Start>(), update_module::<Advance>(), update_module::<Judge>()]
+}

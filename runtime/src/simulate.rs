@@ -1,6 +1,8 @@
 //! Runs a scene: steps a model through time and writes probes, frames and the summary.
 
 use std::path::Path;
+#[cfg(feature = "gpu")]
+use std::sync::Arc;
 use std::time::Instant;
 
 use serde_json::{Value, json};
@@ -8,7 +10,10 @@ use serde_json::{Value, json};
 use crate::backend::{Backend, ForceField, LeftDomain};
 use crate::cg::CgLimits;
 use crate::cpu::{CpuBackend, CpuField, Precision};
+use crate::device::DeviceError;
 use crate::frames::{FrameData, Frames};
+#[cfg(feature = "gpu")]
+use crate::gpu::{Gpu, GpuBackend, GpuField, GpuOptions};
 use crate::integrate::{CentralDifference, ImplicitEuler, NewtonLimits, SemiImplicitEuler, SolverSettings, Statics};
 use crate::model::{BuildError, Model, build};
 use crate::output::{OutputError, ProbeTable, create_folder, remove_file, write_json_atomic};
@@ -27,6 +32,9 @@ pub enum RunError {
     /// Results cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
+    /// The device cannot compute the scene.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
     /// Threads cannot be started.
     #[error("cannot start {threads} threads: {reason}; set solver.threads to fewer")]
     Threads {
@@ -88,20 +96,52 @@ impl Observer for Silent {
     }
 }
 
-/// Runs a scene and writes its results into a folder, if one is given.
+/// Where a run computes.
+#[derive(Debug, Clone, Default)]
+pub enum Device {
+    /// On the CPU.
+    #[default]
+    Cpu,
+    /// On a GPU, in f32.
+    #[cfg(feature = "gpu")]
+    Gpu(Arc<Gpu>, GpuOptions),
+}
+
+/// Runs a scene on the CPU and writes its results into a folder, if one is given.
 ///
 /// # Errors
 /// See [`RunError`]; a simulation that fails on its way is not an error but [`Ending::Failed`].
 pub fn run(scene: &Scene, out: Option<&Path>, observer: &mut (dyn Observer + Send)) -> Result<Outcome, RunError> {
+    run_on(&Device::Cpu, scene, out, observer)
+}
+
+/// As [`run`], on a device.
+///
+/// # Errors
+/// See [`RunError`]; a simulation that fails on its way, or whose device does, is not an error but [`Ending::Failed`].
+pub fn run_on(
+    device: &Device,
+    scene: &Scene,
+    out: Option<&Path>,
+    observer: &mut (dyn Observer + Send),
+) -> Result<Outcome, RunError> {
     let model = build(scene)?;
     let threads = scene.solver.threads;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads as usize)
         .build()
         .map_err(|e| RunError::Threads { threads, reason: e.to_string() })?;
-    pool.install(|| match scene.solver.precision {
-        scene::Precision::F32 => on_cpu::<f32>(scene, model, out, observer),
-        scene::Precision::F64 => on_cpu::<f64>(scene, model, out, observer),
+    pool.install(|| match (device, scene.solver.precision) {
+        (Device::Cpu, scene::Precision::F32) => on_cpu::<f32>(scene, model, out, observer),
+        (Device::Cpu, scene::Precision::F64) => on_cpu::<f64>(scene, model, out, observer),
+        #[cfg(feature = "gpu")]
+        (Device::Gpu(gpu, options), scene::Precision::F32) => {
+            let backend = GpuBackend::new(Arc::clone(gpu), &model.body, *options)?;
+            let field = GpuField::new(&backend, &model.body)?;
+            Run::new(scene, model, backend, field).all(out, observer)
+        }
+        #[cfg(feature = "gpu")]
+        (Device::Gpu(..), scene::Precision::F64) => Err(DeviceError::Precision.into()),
     })
 }
 
@@ -377,9 +417,21 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
                 "stagnated_solutions": self.cost.stagnated,
                 "negative_curvatures": self.cost.negative_curvature,
             },
+            "device_counts": self.device_counts(),
             "units": { "length_m": scale.length, "stress_Pa": scale.stress, "time_s": scale.time },
             "model": plan.to_json(),
             "warnings": self.warnings,
+        })
+    }
+
+    /// What the device was asked to do; nothing where there is none to be waited for.
+    fn device_counts(&self) -> Option<Value> {
+        let counts = self.system.backend.counts();
+        (counts.dispatches > 0).then(|| {
+            json!({
+                "dispatches": counts.dispatches, "submissions": counts.submissions,
+                "readbacks": counts.readbacks, "bytes_read": counts.bytes_read,
+            })
         })
     }
 

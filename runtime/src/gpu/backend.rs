@@ -1,0 +1,378 @@
+//! The GPU backend: vectors on the device, f32, every operation a dispatch; results are waited for only where the host
+//! asks for one.
+
+use std::any::TypeId;
+use std::cell::{Cell, RefCell};
+use std::collections::HashMap;
+use std::rc::Rc;
+use std::sync::Arc;
+
+use crate::backend::{Backend, Counts, Descent, REGISTERS, RUNNING, Update};
+use crate::body::{Body, Constraint};
+use crate::device::DeviceError;
+
+use super::device::Gpu;
+use super::recorder::{Kernel, Memory, Numbers, Recorder};
+use super::shaders::{Access, GROUP, Operation, update_arguments, update_text};
+use super::trace;
+
+/// No motion: a component that is not constrained.
+const FREE: u32 = u32::MAX;
+
+/// What a user of a GPU may tune. Nothing here changes what is computed but the last digits of sums.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GpuOptions {
+    /// Invocations of a work group of the element and node passes (Faure et al. 2012, Fig. 4): a power of two, at most
+    /// 256.
+    pub work_group_size: u32,
+    /// Elements that one invocation computes (Faure et al. 2012, Fig. 5).
+    pub elements_per_invocation: u32,
+    /// Iterations of a linear solver in one submission.
+    pub iterations_per_submission: u32,
+    /// Bytes that a kernel may bind of one buffer; none for the device's limit. A mesh beyond it is split.
+    pub binding_bytes: Option<u64>,
+}
+
+impl Default for GpuOptions {
+    fn default() -> Self {
+        Self { work_group_size: 64, elements_per_invocation: 1, iterations_per_submission: 32, binding_bytes: None }
+    }
+}
+
+/// A vector over nodes on the device: four f32 a node, the fourth the node's constraint mask.
+#[derive(Debug)]
+pub struct GpuVector {
+    memory: Rc<Memory>,
+    /// Where the buffer goes when the vector is dropped: steps that make a vector each time take it from here.
+    unused: Rc<RefCell<Vec<Rc<Memory>>>>,
+}
+
+impl GpuVector {
+    pub(super) fn memory(&self) -> &Memory {
+        &self.memory
+    }
+}
+
+impl Drop for GpuVector {
+    fn drop(&mut self) {
+        self.unused.borrow_mut().push(Rc::clone(&self.memory));
+    }
+}
+
+/// Registers of a solver on the device, f32.
+#[derive(Debug)]
+pub struct GpuRegisters(Memory);
+
+impl GpuRegisters {
+    pub(super) fn memory(&self) -> &Memory {
+        &self.0
+    }
+}
+
+/// Vectors and registers on a GPU.
+#[derive(Debug)]
+pub struct GpuBackend {
+    recorder: Rc<Recorder>,
+    options: GpuOptions,
+    nodes: usize,
+    /// The zero vector, with the constraint masks.
+    origin: Memory,
+    masks: Vec<f32>,
+    /// Constrained nodes and the motions of their components.
+    constrained: Memory,
+    constrained_nodes: usize,
+    motions: usize,
+    partials: Memory,
+    /// Partial sums that the next update adds up.
+    pending: Cell<u32>,
+    unused: Rc<RefCell<Vec<Rc<Memory>>>>,
+    operations: RefCell<HashMap<Operation, Rc<Kernel>>>,
+    updates: RefCell<HashMap<TypeId, Rc<Kernel>>>,
+}
+
+impl GpuBackend {
+    /// A backend for a body.
+    ///
+    /// # Errors
+    /// A vector over the body's nodes is larger than the device can bind, or the device has failed.
+    pub fn new(gpu: Arc<Gpu>, body: &Body, options: GpuOptions) -> Result<Self, DeviceError> {
+        let recorder = Rc::new(Recorder::new(gpu, body.motions.len()));
+        let nodes = body.masses.len();
+        let (origin, constrained) = constrained(nodes, &body.constraints);
+        let largest = nodes.max(body.elements.len());
+        // One partial sum a group; two dimensions of groups may make a few more.
+        let smallest = options.work_group_size.min(GROUP) as usize;
+        let partials = largest.div_ceil(smallest) + (1 << 16) + body.batches.len();
+        let backend = Self {
+            origin: recorder.filled("a vector over the nodes", &origin)?,
+            masks: origin.iter().map(|v| v[3]).collect(),
+            constrained: recorder.filled("constrained nodes", &constrained)?,
+            constrained_nodes: constrained.len(),
+            motions: body.motions.len(),
+            partials: recorder.memory("partial sums", 4 * partials as u64)?,
+            recorder,
+            options,
+            nodes,
+            pending: Cell::new(0),
+            unused: Rc::default(),
+            operations: RefCell::default(),
+            updates: RefCell::default(),
+        };
+        backend.check()?;
+        Ok(backend)
+    }
+
+    pub(super) fn recorder(&self) -> &Rc<Recorder> {
+        &self.recorder
+    }
+
+    pub(super) fn options(&self) -> &GpuOptions {
+        &self.options
+    }
+
+    pub(super) fn nodes(&self) -> usize {
+        self.nodes
+    }
+
+    pub(super) fn partials(&self) -> &Memory {
+        &self.partials
+    }
+
+    /// Says how many partial sums the next update adds up.
+    pub(super) fn sum_is_pending(&self, groups: [u32; 2]) {
+        self.pending.set(groups[0] * groups[1]);
+    }
+
+    fn vector(&self) -> GpuVector {
+        let kept = self.unused.borrow_mut().pop();
+        // A vector as large as `origin`, which the device could bind.
+        let made = || self.recorder.memory("a vector", 16 * self.nodes as u64).expect("as large as one that was made");
+        GpuVector { memory: kept.unwrap_or_else(|| Rc::new(made())), unused: Rc::clone(&self.unused) }
+    }
+
+    /// Records an operation over `count` things.
+    pub(super) fn run(&self, operation: Operation, numbers: Numbers, storage: &[&Memory]) -> [u32; 2] {
+        let kernel = Rc::clone(self.operations.borrow_mut().entry(operation).or_insert_with(|| {
+            let accesses = operation.arguments().into_iter().map(|(_, _, access)| access);
+            let bindings: Vec<Access> = std::iter::once(Access::Uniform).chain(accesses).collect();
+            let label = format!("{operation:?}");
+            self.recorder.kernel(&label, &operation.text(), &bindings, &[("work_group_size", GROUP.into())])
+        }));
+        let groups = match operation {
+            // One group adds up all partial sums.
+            Operation::Sum => [1, 1],
+            _ => self.recorder.groups(numbers[0] as usize, GROUP),
+        };
+        self.recorder.dispatch(&kernel, numbers, storage, groups);
+        groups
+    }
+
+    fn numbers(&self, a: f64) -> Numbers {
+        [self.nodes as u32, 0, (a as f32).to_bits(), 0]
+    }
+
+    /// Records an operation over the nodes.
+    fn each(&self, operation: Operation, a: f64, storage: &[&Memory]) {
+        self.run(operation, self.numbers(a), storage);
+    }
+
+    /// Partial sums or maxima over the nodes, read by the host.
+    fn reduced(&self, operation: Operation, storage: &[&Memory]) -> Option<Vec<f32>> {
+        let [columns, rows] = self.run(operation, self.numbers(0.0), storage);
+        self.recorder.read(&self.partials, (columns * rows) as usize)
+    }
+}
+
+/// The zero vector with the masks of the nodes, and the list of constrained nodes.
+fn constrained(nodes: usize, constraints: &[Constraint]) -> (Vec<[f32; 4]>, Vec<[u32; 4]>) {
+    let mut masks = vec![0_u32; nodes];
+    let mut list: Vec<[u32; 4]> = Vec::new();
+    for c in constraints {
+        masks[c.node as usize] |= 1 << c.component;
+        if list.last().is_none_or(|last| last[0] != c.node) {
+            list.push([c.node, FREE, FREE, FREE]);
+        }
+        let last = list.last_mut().expect("it was pushed above");
+        last[1 + c.component as usize] = c.motion as u32;
+    }
+    (masks.into_iter().map(|mask| [0.0, 0.0, 0.0, mask as f32]).collect(), list)
+}
+
+impl Backend for GpuBackend {
+    type Vector = GpuVector;
+    type Registers = GpuRegisters;
+
+    fn zeros(&self) -> GpuVector {
+        let mut x = self.vector();
+        self.clear(&mut x);
+        x
+    }
+
+    fn upload(&self, values: &[[f64; 3]]) -> GpuVector {
+        let x = self.vector();
+        let masks = self.masks.iter();
+        let content: Vec<[f32; 4]> =
+            values.iter().zip(masks).map(|(v, &mask)| [v[0] as f32, v[1] as f32, v[2] as f32, mask]).collect();
+        self.recorder.write(&x.memory, &content);
+        x
+    }
+
+    fn download(&self, x: &GpuVector) -> Vec<[f64; 3]> {
+        match self.recorder.read::<[f32; 4]>(&x.memory, self.nodes) {
+            Some(values) => values.into_iter().map(|[x, y, z, _]| [x, y, z].map(f64::from)).collect(),
+            None => vec![[f64::NAN; 3]; self.nodes],
+        }
+    }
+
+    fn copy(&self, x: &GpuVector, y: &mut GpuVector) {
+        self.each(Operation::Copy, 0.0, &[&x.memory, &y.memory]);
+    }
+
+    fn clear(&self, x: &mut GpuVector) {
+        self.each(Operation::Copy, 0.0, &[&self.origin, &x.memory]);
+    }
+
+    fn axpy(&self, a: f64, x: &GpuVector, y: &mut GpuVector) {
+        self.each(Operation::Axpy, a, &[&x.memory, &y.memory]);
+    }
+
+    fn xpby(&self, x: &GpuVector, b: f64, y: &mut GpuVector) {
+        self.each(Operation::Xpby, b, &[&x.memory, &y.memory]);
+    }
+
+    fn scale(&self, b: f64, y: &mut GpuVector) {
+        self.each(Operation::Scale, b, &[&y.memory]);
+    }
+
+    fn multiply_add(&self, a: f64, d: &GpuVector, x: &GpuVector, y: &mut GpuVector) {
+        self.each(Operation::MultiplyAdd, a, &[&d.memory, &x.memory, &y.memory]);
+    }
+
+    fn divide(&self, x: &GpuVector, d: &GpuVector, y: &mut GpuVector) {
+        self.each(Operation::Divide, 0.0, &[&x.memory, &d.memory, &y.memory]);
+    }
+
+    fn dot(&self, x: &GpuVector, y: &GpuVector) -> f64 {
+        match self.reduced(Operation::Dot, &[&x.memory, &y.memory, &self.partials]) {
+            Some(partials) => partials.into_iter().map(f64::from).sum(),
+            None => f64::NAN,
+        }
+    }
+
+    fn max_abs(&self, x: &GpuVector) -> f64 {
+        match self.reduced(Operation::MaxAbs, &[&x.memory, &self.partials]) {
+            Some(partials) => match partials.into_iter().fold(0.0, f32::max) {
+                f32::MAX => f64::INFINITY,
+                largest => largest.into(),
+            },
+            None => f64::NAN,
+        }
+    }
+
+    fn project(&self, x: &mut GpuVector) {
+        self.each(Operation::Project, 0.0, &[&x.memory]);
+    }
+
+    fn impose(&self, motions: &[f64], x: &mut GpuVector) {
+        if self.constrained_nodes > 0 {
+            debug_assert_eq!(motions.len(), self.motions);
+            let numbers = [self.constrained_nodes as u32, self.recorder.motions(motions), 0, 0];
+            self.run(Operation::Impose, numbers, &[&self.constrained, self.recorder.values(), &x.memory]);
+        }
+    }
+
+    fn impose_change(&self, motions: &[f64], x: &GpuVector, y: &mut GpuVector) {
+        if self.constrained_nodes > 0 {
+            debug_assert_eq!(motions.len(), self.motions);
+            let numbers = [self.constrained_nodes as u32, self.recorder.motions(motions), 0, 0];
+            let values = self.recorder.values();
+            self.run(Operation::ImposeChange, numbers, &[&self.constrained, values, &x.memory, &y.memory]);
+        }
+    }
+
+    fn make_positive(&self, x: &mut GpuVector) {
+        self.each(Operation::MakePositive, 0.0, &[&x.memory]);
+    }
+
+    fn epsilon(&self) -> f64 {
+        f64::from(f32::EPSILON) / 2.0
+    }
+
+    fn smallest(&self) -> f64 {
+        f32::MIN_POSITIVE.into()
+    }
+
+    fn registers(&self, values: [f64; REGISTERS]) -> GpuRegisters {
+        let values = values.map(|v| v as f32);
+        GpuRegisters(self.recorder.filled("registers", &values).expect("every device binds 64 bytes"))
+    }
+
+    fn load(&self, values: [f64; REGISTERS], registers: &mut GpuRegisters) {
+        self.recorder.write(&registers.0, &values.map(|v| v as f32));
+    }
+
+    fn read(&self, registers: &GpuRegisters) -> [f64; REGISTERS] {
+        match self.recorder.read::<f32>(&registers.0, REGISTERS) {
+            Some(values) => std::array::from_fn(|k| values[k].into()),
+            None => [f64::NAN; REGISTERS],
+        }
+    }
+
+    fn dot_to(&self, x: &GpuVector, y: &GpuVector, registers: &mut GpuRegisters, k: usize) {
+        let storage = [&*x.memory, &*y.memory, &self.partials];
+        let [columns, rows] = self.run(Operation::Dot, self.numbers(0.0), &storage);
+        self.run(Operation::Sum, [columns * rows, k as u32, 0, 0], &[&self.partials, &registers.0]);
+    }
+
+    fn update<U: Update>(&self, registers: &mut GpuRegisters) {
+        let kernel = Rc::clone(self.updates.borrow_mut().entry(TypeId::of::<U>()).or_insert_with(|| {
+            let accesses = update_arguments(U::SUMS).into_iter().map(|(_, _, access)| access);
+            let bindings: Vec<Access> = std::iter::once(Access::Uniform).chain(accesses).collect();
+            let text = update_text(U::SUMS, &trace::statements::<U>());
+            let label = std::any::type_name::<U>();
+            self.recorder.kernel(label, &text, &bindings, &[("work_group_size", GROUP.into())])
+        }));
+        let numbers = [self.pending.get(), 0, 0, 0];
+        if U::SUMS {
+            self.recorder.dispatch(&kernel, numbers, &[&self.partials, &registers.0], [1, 1]);
+        } else {
+            self.recorder.dispatch(&kernel, numbers, &[&registers.0], [1, 1]);
+        }
+    }
+
+    fn descend(&self, descent: Descent<Self>, registers: &mut GpuRegisters) {
+        let Descent { d, q, preconditioner, x, r, z } = descent;
+        let vectors = [d, q, preconditioner, &*x, &*r, &*z].map(|v| &*v.memory);
+        let [d, q, preconditioner, x, r, z] = vectors;
+        let storage = [&registers.0, d, q, preconditioner, x, r, z, &self.partials];
+        let groups = self.run(Operation::Descend, self.numbers(0.0), &storage);
+        self.sum_is_pending(groups);
+    }
+
+    fn turn(&self, z: &GpuVector, d: &mut GpuVector, registers: &GpuRegisters) {
+        self.each(Operation::Turn, 0.0, &[&registers.0, &z.memory, &d.memory]);
+    }
+
+    fn iterations_between_readings(&self) -> u32 {
+        self.options.iterations_per_submission
+    }
+
+    fn name(&self) -> String {
+        self.recorder.gpu().info().name.clone()
+    }
+
+    fn counts(&self) -> Counts {
+        self.recorder.counts()
+    }
+
+    fn check(&self) -> Result<(), DeviceError> {
+        self.recorder.gpu().check()
+    }
+}
+
+/// The gate of passes that nothing stops: registers of a solver that runs.
+pub(super) fn open_gate() -> [f32; REGISTERS] {
+    let mut gate = [0.0; REGISTERS];
+    gate[RUNNING] = 1.0;
+    gate
+}
