@@ -1,5 +1,6 @@
 //! The `tensormass` command: reads the arguments, calls one subcommand, turns its outcome into an exit status.
 
+mod devices;
 mod failure;
 mod law;
 mod plan;
@@ -31,6 +32,8 @@ enum Command {
     Run(run::Arguments),
     /// Shows what a scene will compute, and what it leaves out.
     Plan(plan::Arguments),
+    /// Shows the GPUs of this machine, and which one `run --device auto` takes.
+    Devices(devices::Arguments),
     /// Constitutive laws: what this build has, and derivations of new ones.
     #[command(subcommand)]
     Law(law::Command),
@@ -41,6 +44,7 @@ impl Command {
         match self {
             Command::Run(arguments) => run::call(&arguments),
             Command::Plan(arguments) => plan::call(&arguments),
+            Command::Devices(arguments) => devices::call(&arguments),
             Command::Law(command) => law::call(command),
         }
     }

@@ -6,9 +6,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use tensormass_runtime::scene::{Override, Scene, load};
+use tensormass_runtime::device::{DeviceChoice, DeviceError};
+use tensormass_runtime::scene::{Override, Precision, Scene, load};
 use tensormass_runtime::simulate::{Ending, Observer, Outcome, RunError, run};
 use tensormass_runtime::step_limit::StepLimits;
 
@@ -23,9 +24,10 @@ pub struct Arguments {
     /// Folder for the results [default: out/NAME for scene NAME.toml].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Where to compute.
-    #[arg(long, value_enum, default_value_t = Device::Auto)]
-    device: Device,
+    /// Where to compute: auto is a hardware GPU if there is one and this version can use it, otherwise the CPU; gpu is
+    /// any GPU; `tensormass devices` lists their names.
+    #[arg(long, value_name = "auto|cpu|gpu|gpu:NAME", default_value_t = DeviceChoice::Auto)]
+    device: DeviceChoice,
     /// Print nothing but errors.
     #[arg(long)]
     quiet: bool,
@@ -47,16 +49,6 @@ pub struct SceneArguments {
     precision: Option<String>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Device {
-    /// A hardware GPU if there is one and this version can use it, otherwise the CPU.
-    Auto,
-    /// The CPU.
-    Cpu,
-    /// A GPU.
-    Gpu,
-}
-
 impl SceneArguments {
     /// Reads the scene with its changes.
     pub fn load(&self) -> Result<Scene, Failure> {
@@ -70,12 +62,8 @@ impl SceneArguments {
 
 /// Runs a scene.
 pub fn call(arguments: &Arguments) -> Result<(), Failure> {
-    if arguments.device == Device::Gpu {
-        return Err(Failure::bad_input(
-            "--device gpu: this version computes on the CPU only; use --device cpu or auto",
-        ));
-    }
     let scene = arguments.scene.load()?;
+    check_device(&arguments.device, &scene)?;
     let out = arguments.out.clone().unwrap_or_else(|| default_out(&scene));
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
@@ -100,6 +88,35 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
         }
         Ending::Interrupted => Err(Failure::Interrupted(format!("interrupted; the results are in {}", out.display()))),
     }
+}
+
+/// Refuses a device that cannot compute this scene.
+fn check_device(choice: &DeviceChoice, scene: &Scene) -> Result<(), Failure> {
+    match choice {
+        DeviceChoice::Auto | DeviceChoice::Cpu => Ok(()),
+        DeviceChoice::Gpu | DeviceChoice::Named(_) => {
+            let refused = |reason: String| Failure::bad_input(format!("--device {choice}: {reason}"));
+            // Told first: it holds on every GPU.
+            let opened = match scene.solver.precision {
+                Precision::F64 => Err(DeviceError::Precision),
+                Precision::F32 => open_gpu(choice),
+            };
+            opened.map_err(|e| refused(e.to_string()))?;
+            Err(refused("this version computes on the CPU only; use --device cpu or auto".to_owned()))
+        }
+    }
+}
+
+/// Whether the chosen GPU is there and can be opened.
+#[cfg(feature = "gpu")]
+fn open_gpu(choice: &DeviceChoice) -> Result<(), DeviceError> {
+    tensormass_runtime::gpu::open(choice).map(|_| ())
+}
+
+/// Whether the chosen GPU is there and can be opened: not in this build.
+#[cfg(not(feature = "gpu"))]
+fn open_gpu(_: &DeviceChoice) -> Result<(), DeviceError> {
+    Err(DeviceError::NoGpuSupport)
 }
 
 fn default_out(scene: &Scene) -> PathBuf {

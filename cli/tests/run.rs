@@ -136,7 +136,15 @@ fn bad_input_ends_with_2_a_place_and_a_remedy() {
             "error: --set material.0.parameters.poisson=0.5: `poisson` is 0.5, outside the range of law `hooke`\n  = help: \
              choose a value from -0.9 to 0.4999\n",
         ),
-        (&["--device", "gpu"], "error: --device gpu: this version computes on the CPU only; use --device cpu or auto"),
+        (
+            &["--device", "gpu"],
+            "error: --device gpu: a GPU computes in f32, and f64 is asked for\n  = help: choose --precision f32, or \
+             --device cpu\n",
+        ),
+        (
+            &["--device", "cuda"],
+            "error: invalid value 'cuda' for '--device <auto|cpu|gpu|gpu:NAME>': `cuda` is not a device; choose auto, ",
+        ),
         (&["--precision", "f16"], "error: --set solver.precision=f16: "),
     ];
     for (arguments, message) in cases {

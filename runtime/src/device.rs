@@ -243,27 +243,28 @@ pub struct DeviceInfo {
 
 /// The place of the chosen device in the list of all; none for the CPU.
 ///
-/// `devices` is in order of preference, as [`DeviceKind`] orders it. A device that cannot be used is never chosen. Of
-/// several devices that a name fits, an equal name comes before one that contains it, then the first of the list.
+/// A device that cannot be used is never chosen. Of several that can, the kind decides, in the order of
+/// [`DeviceKind`], then the place in the list; an equal name comes before one that contains what is asked for.
 ///
 /// # Errors
 /// [`DeviceError::NoAdapter`] or [`DeviceError::UnknownName`] if a GPU is asked for by `gpu` or by name and there is
 /// none such.
 pub fn select(choice: &DeviceChoice, devices: &[DeviceInfo]) -> Result<Option<usize>, DeviceError> {
-    let usable = |d: &DeviceInfo| d.unusable.is_none();
+    let best = |fits: &dyn Fn(&DeviceInfo) -> bool| {
+        let usable = devices.iter().enumerate().filter(|(_, d)| d.unusable.is_none() && fits(d));
+        usable.min_by_key(|(_, d)| d.kind).map(|(place, _)| place)
+    };
     match choice {
         DeviceChoice::Cpu => Ok(None),
-        DeviceChoice::Auto => Ok(devices.iter().position(|d| usable(d) && d.kind.is_hardware())),
-        DeviceChoice::Gpu => match devices.iter().position(usable) {
+        DeviceChoice::Auto => Ok(best(&|d| d.kind.is_hardware())),
+        DeviceChoice::Gpu => match best(&|_| true) {
             Some(place) => Ok(Some(place)),
             None => Err(none_usable(devices.iter())),
         },
         DeviceChoice::Named(asked) => {
             let wanted = asked.to_lowercase();
-            let equal = |d: &DeviceInfo| d.name.to_lowercase() == wanted;
             let fits = |d: &DeviceInfo| d.name.to_lowercase().contains(&wanted);
-            let place = devices.iter().position(|d| usable(d) && equal(d));
-            match place.or_else(|| devices.iter().position(|d| usable(d) && fits(d))) {
+            match best(&|d| d.name.to_lowercase() == wanted).or_else(|| best(&fits)) {
                 Some(place) => Ok(Some(place)),
                 None if devices.is_empty() || devices.iter().any(fits) => {
                     Err(none_usable(devices.iter().filter(|d| fits(d))))

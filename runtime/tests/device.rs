@@ -80,6 +80,15 @@ fn auto_takes_hardware_or_the_cpu_and_gpu_takes_what_there_is() {
         check("cpu", devices, None);
     }
     check("gpu", &alone, Some("llvmpipe"));
+    // Each is preferred to those after it, wherever it stands.
+    let kinds = [&discrete, &integrated, &passed_on, &other, &software].map(DeviceInfo::clone);
+    for first in 0..kinds.len() {
+        let mut devices = kinds[first..].to_vec();
+        for _ in 0..2 {
+            check("gpu", &devices, Some(&kinds[first].name));
+            devices.reverse();
+        }
+    }
     for hardware in [discrete.clone(), integrated.clone(), passed_on, other] {
         let devices = [hardware.clone(), software.clone()];
         check("auto", &devices, Some(&hardware.name));
@@ -229,7 +238,7 @@ mod on_a_device {
     }
 
     #[test]
-    fn a_buffer_beyond_the_memory_is_an_error_and_no_panic() {
+    fn a_buffer_beyond_the_limit_is_an_error_and_no_panic() {
         let Some(gpu) = test_device() else { return };
         let size = gpu.limits().buffer_bytes + 256;
         let usage = wgpu::BufferUsages::STORAGE;

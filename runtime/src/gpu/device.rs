@@ -18,7 +18,7 @@ pub fn adapters() -> Vec<DeviceInfo> {
 ///
 /// `auto` takes a hardware GPU if there is one, otherwise the CPU, never a software device. `gpu` takes any, hardware
 /// first; [`Gpu::is_software`] tells the caller, who warns. `gpu:NAME` takes the device of that name, otherwise the
-/// first of [`adapters`] whose name contains it, in whatever case.
+/// first of [`adapters`] whose name contains it, in whatever case; see [`select`].
 ///
 /// # Errors
 /// [`DeviceError::NoAdapter`] if a GPU is asked for and there is none, or if it cannot be opened;
@@ -52,6 +52,8 @@ impl Gpu {
         let request = wgpu::DeviceDescriptor {
             label: Some("tensormass"),
             required_limits: required(&adapter.limits()),
+            // Buffers are made once a run: what counts is the memory they take, not the time to make them.
+            memory_hints: wgpu::MemoryHints::MemoryUsage,
             ..Default::default()
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&request))
@@ -105,20 +107,30 @@ impl Gpu {
     /// # Errors
     /// As [`Gpu::check`]; a device that is lost meanwhile is [`DeviceError::Lost`].
     pub fn wait(&self) -> Result<(), DeviceError> {
-        // wgpu panics if the driver reports a loss while it waits, after it has called the callback that records it.
-        let polled = catch_unwind(AssertUnwindSafe(|| self.device.poll(wgpu::PollType::wait_indefinitely())));
-        let reason = match polled {
-            Ok(Ok(_)) => return self.check(),
-            Ok(Err(error)) => error.to_string(),
-            Err(_) => "its driver reported a failure while it computed".to_owned(),
-        };
-        self.faults.record(DeviceError::Lost { reason });
+        if let Err(reason) = finished(|| self.device.poll(wgpu::PollType::wait_indefinitely())) {
+            // Kept only if wgpu has not called back before, with what the driver said.
+            self.faults.record(DeviceError::Lost { reason });
+        }
         self.check()
     }
 
     /// Closes the device: from here on nothing is computed, and [`Gpu::wait`] reports the loss. Tests provoke it so.
     pub fn destroy(&self) {
         self.device.destroy();
+    }
+}
+
+/// Whether a wait came to its end; why not, otherwise. wgpu panics if the driver reports a failure meanwhile: that the
+/// device is lost is news from outside, not a defect, and must not end the process.
+fn finished<T>(wait: impl FnOnce() -> Result<T, wgpu::PollError>) -> Result<(), String> {
+    match catch_unwind(AssertUnwindSafe(wait)) {
+        Ok(Ok(_)) => Ok(()),
+        Ok(Err(error)) => Err(error.to_string()),
+        Err(panic) => {
+            let formatted = panic.downcast_ref::<String>().map(String::as_str);
+            let text = formatted.or_else(|| panic.downcast_ref::<&str>().copied());
+            Err(text.unwrap_or("its driver reported a failure").trim().to_owned())
+        }
     }
 }
 
@@ -224,4 +236,31 @@ fn unusable(offered: &wgpu::Limits) -> Option<String> {
         missing.push(format!("{name} is {found}, needed is {needed}"));
     });
     (!missing.is_empty()).then(|| missing.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Faults, finished};
+    use crate::device::DeviceError;
+
+    #[test]
+    fn a_wait_that_fails_or_panics_gives_a_reason() {
+        assert_eq!(finished(|| Ok(())), Ok(()));
+        assert_eq!(finished(|| Err::<(), _>(wgpu::PollError::Timeout)), Err(wgpu::PollError::Timeout.to_string()));
+        // As wgpu does.
+        let reason = "lost".to_owned();
+        let lost = || -> Result<(), wgpu::PollError> { panic!("Error in Device::poll: {reason}\n") };
+        assert_eq!(finished(lost), Err("Error in Device::poll: lost".to_owned()));
+        assert_eq!(finished(|| -> Result<(), wgpu::PollError> { panic!("plain") }), Err("plain".to_owned()));
+    }
+
+    #[test]
+    fn the_first_fault_stays() {
+        let faults = Faults::default();
+        assert_eq!(faults.first(), None);
+        let [first, second] = ["first", "second"].map(|text| DeviceError::Refused(text.to_owned()));
+        faults.record(first.clone());
+        faults.clone().record(second);
+        assert_eq!(faults.first(), Some(first));
+    }
 }
