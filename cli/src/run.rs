@@ -9,9 +9,11 @@ use std::time::Duration;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use tensormass_runtime::device::{DeviceChoice, DeviceError};
-use tensormass_runtime::scene::{Override, Precision, Scene, load};
-use tensormass_runtime::simulate::{Ending, Observer, Outcome, RunError, run};
+use tensormass_runtime::scene::{Override, Scene, load};
+use tensormass_runtime::simulate::{Ending, Observer, Outcome, RunError, run_on};
 use tensormass_runtime::step_limit::StepLimits;
+use tensormass_runtime::system::SolveError;
+use tensormass_runtime::target::Target;
 
 use crate::failure::Failure;
 use crate::text;
@@ -63,17 +65,22 @@ impl SceneArguments {
 /// Runs a scene.
 pub fn call(arguments: &Arguments) -> Result<(), Failure> {
     let scene = arguments.scene.load()?;
-    check_device(&arguments.device, &scene)?;
+    let target = Target::open(&arguments.device, scene.solver.precision)
+        .map_err(|e| Failure::bad_input(format!("--device {}: {e}", arguments.device)))?;
     let out = arguments.out.clone().unwrap_or_else(|| default_out(&scene));
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
     // Without a handler an interruption ends the process as it always did: nothing else depends on it.
     let _ = ctrlc::set_handler(move || flag.store(true, Ordering::SeqCst));
     let mut display = Display::new(interrupted, arguments.quiet || arguments.json, arguments.quiet);
-    let outcome = run(&scene, Some(&out), &mut display).map_err(|e| match e {
+    let outcome = run_on(&target, &scene, Some(&out), &mut display).map_err(|e| match e {
         RunError::Build(e) => Failure::bad_input(e.to_string()),
         RunError::Output(e) => Failure::bad_input(e.to_string()),
         RunError::Threads { .. } => Failure::bad_input(e.to_string()),
+        RunError::Device(
+            e @ (DeviceError::OutOfMemory { .. } | DeviceError::Lost { .. } | DeviceError::Refused(_)),
+        ) => Failure::Other(e.to_string()),
+        RunError::Device(e) => Failure::bad_input(e.to_string()),
     })?;
     display.finish();
     if arguments.json {
@@ -84,39 +91,13 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
     match outcome.ending {
         Ending::Done => Ok(()),
         Ending::Failed(e) => {
-            Err(Failure::Simulation(format!("{e}\nwhat was computed until then is in {}", out.display())))
+            let text = format!("{e}\nwhat was computed until then is in {}", out.display());
+            // The simulation itself may be sound.
+            let device = matches!(e, SolveError::Device(_));
+            Err(if device { Failure::Other(text) } else { Failure::Simulation(text) })
         }
         Ending::Interrupted => Err(Failure::Interrupted(format!("interrupted; the results are in {}", out.display()))),
     }
-}
-
-/// Refuses a device that cannot compute this scene.
-fn check_device(choice: &DeviceChoice, scene: &Scene) -> Result<(), Failure> {
-    match choice {
-        DeviceChoice::Auto | DeviceChoice::Cpu => Ok(()),
-        DeviceChoice::Gpu | DeviceChoice::Named(_) => {
-            let refused = |reason: String| Failure::bad_input(format!("--device {choice}: {reason}"));
-            // Told first: it holds on every GPU.
-            let opened = match scene.solver.precision {
-                Precision::F64 => Err(DeviceError::Precision),
-                Precision::F32 => open_gpu(choice),
-            };
-            opened.map_err(|e| refused(e.to_string()))?;
-            Err(refused("this version computes on the CPU only; use --device cpu or auto".to_owned()))
-        }
-    }
-}
-
-/// Whether the chosen GPU is there and can be opened.
-#[cfg(feature = "gpu")]
-fn open_gpu(choice: &DeviceChoice) -> Result<(), DeviceError> {
-    tensormass_runtime::gpu::open(choice).map(|_| ())
-}
-
-/// Whether the chosen GPU is there and can be opened: not in this build.
-#[cfg(not(feature = "gpu"))]
-fn open_gpu(_: &DeviceChoice) -> Result<(), DeviceError> {
-    Err(DeviceError::NoGpuSupport)
 }
 
 fn default_out(scene: &Scene) -> PathBuf {

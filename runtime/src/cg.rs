@@ -191,8 +191,9 @@ impl<B: Backend> ConjugateGradient<B> {
             }
             left -= now;
             let s = backend.read(registers);
-            // A device that has failed reads NaN: there is nothing to go on with.
-            if left == 0 || !(s[RUNNING] > 0.0) {
+            // A device that has failed reads NaN, and there is nothing to go on with.
+            let runs = s[RUNNING] > 0.0;
+            if left == 0 || !runs {
                 return report(&s);
             }
         }

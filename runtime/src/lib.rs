@@ -28,5 +28,6 @@ pub mod scene;
 pub mod simulate;
 pub mod step_limit;
 pub mod system;
+pub mod target;
 
 pub use tensormass_kernels::{LawEntry, LawInfo, Operations, ParameterInfo, Structure, law, laws};

@@ -13,7 +13,7 @@ use crate::cpu::{CpuBackend, CpuField, Precision};
 use crate::device::DeviceError;
 use crate::frames::{FrameData, Frames};
 #[cfg(feature = "gpu")]
-use crate::gpu::{Gpu, GpuBackend, GpuField, GpuOptions};
+use crate::gpu::{GpuBackend, GpuField};
 use crate::integrate::{CentralDifference, ImplicitEuler, NewtonLimits, SemiImplicitEuler, SolverSettings, Statics};
 use crate::model::{BuildError, Model, build};
 use crate::output::{OutputError, ProbeTable, create_folder, remove_file, write_json_atomic};
@@ -22,6 +22,7 @@ use crate::probe::{Energies, Needs, Snapshot};
 use crate::scene::{self, Scene};
 use crate::step_limit::{StepLimits, element_limit, power_limit};
 use crate::system::{Integrator, SolveError, State, StepReport, System};
+use crate::target::Target;
 
 /// Why a run could not be carried out at all.
 #[derive(Debug, thiserror::Error)]
@@ -96,23 +97,12 @@ impl Observer for Silent {
     }
 }
 
-/// Where a run computes.
-#[derive(Debug, Clone, Default)]
-pub enum Device {
-    /// On the CPU.
-    #[default]
-    Cpu,
-    /// On a GPU, in f32.
-    #[cfg(feature = "gpu")]
-    Gpu(Arc<Gpu>, GpuOptions),
-}
-
 /// Runs a scene on the CPU and writes its results into a folder, if one is given.
 ///
 /// # Errors
 /// See [`RunError`]; a simulation that fails on its way is not an error but [`Ending::Failed`].
 pub fn run(scene: &Scene, out: Option<&Path>, observer: &mut (dyn Observer + Send)) -> Result<Outcome, RunError> {
-    run_on(&Device::Cpu, scene, out, observer)
+    run_on(&Target::Cpu, scene, out, observer)
 }
 
 /// As [`run`], on a device.
@@ -120,7 +110,7 @@ pub fn run(scene: &Scene, out: Option<&Path>, observer: &mut (dyn Observer + Sen
 /// # Errors
 /// See [`RunError`]; a simulation that fails on its way, or whose device does, is not an error but [`Ending::Failed`].
 pub fn run_on(
-    device: &Device,
+    target: &Target,
     scene: &Scene,
     out: Option<&Path>,
     observer: &mut (dyn Observer + Send),
@@ -131,17 +121,19 @@ pub fn run_on(
         .num_threads(threads as usize)
         .build()
         .map_err(|e| RunError::Threads { threads, reason: e.to_string() })?;
-    pool.install(|| match (device, scene.solver.precision) {
-        (Device::Cpu, scene::Precision::F32) => on_cpu::<f32>(scene, model, out, observer),
-        (Device::Cpu, scene::Precision::F64) => on_cpu::<f64>(scene, model, out, observer),
+    pool.install(|| match (target, scene.solver.precision) {
+        (Target::Cpu, scene::Precision::F32) => on_cpu::<f32>(scene, model, out, observer),
+        (Target::Cpu, scene::Precision::F64) => on_cpu::<f64>(scene, model, out, observer),
         #[cfg(feature = "gpu")]
-        (Device::Gpu(gpu, options), scene::Precision::F32) => {
+        (Target::Gpu(gpu, options), scene::Precision::F32) => {
             let backend = GpuBackend::new(Arc::clone(gpu), &model.body, *options)?;
             let field = GpuField::new(&backend, &model.body)?;
-            Run::new(scene, model, backend, field).all(out, observer)
+            let mut run = Run::new(scene, model, backend, field);
+            run.warnings.extend(target.warning());
+            run.all(out, observer)
         }
         #[cfg(feature = "gpu")]
-        (Device::Gpu(..), scene::Precision::F64) => Err(DeviceError::Precision.into()),
+        (Target::Gpu(..), scene::Precision::F64) => Err(DeviceError::Precision.into()),
     })
 }
 

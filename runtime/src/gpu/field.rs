@@ -205,7 +205,7 @@ impl GpuField {
         }
         let first = |range: &Range| {
             let margins = self.recorder.read::<f32>(range.margins.as_ref()?, range.elements.len())?;
-            let place = margins.iter().position(|m| !(*m > 0.0))?;
+            let place = margins.iter().position(|&m| m <= 0.0 || m.is_nan())?;
             let domain = range.law.info.domain.unwrap_or("everywhere");
             Some(LeftDomain {
                 element: range.elements[place],
