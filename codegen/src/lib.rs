@@ -7,7 +7,7 @@
 //! A law file ([`law`]) is read and checked into a [`law::ast::Law`]. The derivation (feature `derive`) differentiates
 //! its energy once for the stress and twice for the stress differential and lowers the stages into
 //! [`ir::KernelIr`], which [`ir::KernelIr::validate`] turns into the [`ir::ValidKernel`] that printers accept. Without
-//! the feature, [`derivation::Derivation`]s are read from the committed text. The printers ([`print`]) write the same
+//! the feature, [`derivation::Derivation`]s are read from the committed text. The printers ([`mod@print`]) write the same
 //! kernels as Rust over any number type ([`print::rust`]) and as complete WGSL compute passes ([`print::wgsl`]), which
 //! the Rust text holds as strings. [`build`] is what a build script calls.
 
