@@ -1,13 +1,18 @@
-//! Snapshots of what is generated, for review: each reviewed law's Rust module, the element, and the operation counts.
+//! Snapshots of what is generated, for review: each reviewed law's Rust module and WGSL, the element, the node passes,
+//! and the operation counts.
 //!
 //! The IR of a law has no snapshot here because `laws/derived/NAME.ir` is one: `derivations.rs` compares it byte by
-//! byte. Every printed module below also compiles and runs: the kernels crate includes the same text.
+//! byte. Every printed module below also compiles and runs: the kernels crate includes the same text. `wgsl.rs` says what
+//! is required of the WGSL.
+
+use std::collections::HashSet;
 
 use tensormass_kernels::laws;
 use tensormass_testing::codegen::derivation::Derivation;
 use tensormass_testing::codegen::element::{ElementKernels, kernels, tetrahedron_p1};
 use tensormass_testing::codegen::ir::{Input, ValidKernel};
-use tensormass_testing::codegen::{law, print::rust};
+use tensormass_testing::codegen::law;
+use tensormass_testing::codegen::print::{rust, wgsl};
 use tensormass_testing::{derivation, root};
 
 /// Add + mul + div an element of the literature's best hand-written or staged kernels (Force, DForce with G recomputed).
@@ -37,8 +42,21 @@ fn check(name: &str, text: &str) {
     settings.bind(|| insta::assert_snapshot!(name, text));
 }
 
+/// The passes of a law for review: of each, the parts between empty lines that no earlier one has.
+fn passes(shaders: &[wgsl::Shader; 5]) -> String {
+    let mut shown = HashSet::new();
+    let mut out = String::new();
+    for (name, shader) in wgsl::NAMES.iter().zip(shaders) {
+        out += &format!("// ---- {name}: binds {:?}\n\n", shader.bindings);
+        for part in shader.text.split("\n\n").filter(|part| shown.insert(*part)) {
+            out += &format!("{}\n\n", part.trim_end());
+        }
+    }
+    out
+}
+
 #[test]
-fn rust_of_each_reviewed_law() {
+fn each_reviewed_law() {
     let mut unreviewed = 0;
     for entry in laws() {
         let name = entry.info.name;
@@ -51,6 +69,7 @@ fn rust_of_each_reviewed_law() {
         let law = law::parse(&path, &text).expect("the build accepted it");
         let derivation = derivation(env!("TENSORMASS_GENERATED"), name);
         check(&format!("law_{name}"), &rust::format(rust::law_module(&law, &derivation, true)).expect("Rust"));
+        check(&format!("wgsl_{name}"), &passes(&wgsl::law_shaders(&law, &derivation, &element())));
     }
     eprintln!("skipped {unreviewed} unreviewed laws");
 }
@@ -61,6 +80,12 @@ fn element_module() {
     check("element_tetrahedron_p1", &rust::format(rust::element_module(&element, &Default::default())).expect("Rust"));
     let ir = [&element.gradient, &element.contract, &element.node_gradients].map(|k| k.ir().to_text());
     check("element_tetrahedron_p1_ir", &ir.join("\n"));
+}
+
+#[test]
+fn node_passes() {
+    check("wgsl_node_sum", &wgsl::node_sum().text);
+    check("wgsl_node_product", &wgsl::node_product().text);
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use tensormass_kernels::generated::tetrahedron_p1::{NODE_PRODUCT, NODE_SUM};
 use tensormass_kernels::laws;
 use tensormass_kernels::shader::Shader;
+use tensormass_testing::codegen::print::wgsl::is_free;
 use tensormass_testing::wgsl;
 
 /// `SlotIndex` is `slot_index` in the text.
@@ -15,6 +16,16 @@ fn snake_case(name: &str) -> String {
         out.push(c.to_ascii_lowercase());
     }
     out
+}
+
+/// The names that a text declares for the whole module, but types, which begin with a capital letter.
+fn declared(text: &str) -> impl Iterator<Item = &str> {
+    text.lines().filter_map(|line| {
+        let binding = line.strip_prefix("@group").and_then(|rest| Some(rest.split_once("> ")?.1));
+        let name =
+            binding.or_else(|| ["fn ", "override ", "struct "].iter().find_map(|word| line.strip_prefix(word)))?;
+        name.split(['(', ':', ' ']).next().filter(|name| !name.starts_with(|c: char| c.is_ascii_uppercase()))
+    })
 }
 
 fn check(what: &str, shader: &Shader) {
@@ -38,7 +49,11 @@ fn element_passes_of_every_law() {
         let s = law.shaders;
         let passes = [&s.energy, &s.force, &s.dforce, &s.diagonal, &s.cauchy];
         for (name, shader) in ["energy", "force", "dforce", "diagonal", "cauchy"].iter().zip(passes) {
-            check(&format!("{}, {name}", law.info.name), shader);
+            let what = format!("{}, {name}", law.info.name);
+            check(&what, shader);
+            for name in declared(shader.text) {
+                assert!(!is_free(name), "{what}: a value could be named like `{name}`");
+            }
         }
     }
 }
@@ -47,4 +62,14 @@ fn element_passes_of_every_law() {
 fn node_passes() {
     check("node_sum", &NODE_SUM);
     check("node_product", &NODE_PRODUCT);
+}
+
+#[test]
+fn no_value_takes_a_word_of_the_language() {
+    for word in wgsl::words() {
+        assert!(!is_free(word), "`{word}` is taken");
+    }
+    for name in ["j", "w_j", "tr_a", "n00", "d0_n01", "volume_ratio"] {
+        assert!(is_free(name), "`{name}` is free");
+    }
 }

@@ -1,13 +1,15 @@
 //! From a strain energy density to simulation kernels.
 //!
 //! ```text
-//! law file --law::parse--> Law --derive--> Derivation (KernelIr -> ValidKernel) --print--> Rust text
+//! law file --law::parse--> Law --derive--> Derivation (KernelIr -> ValidKernel) --print--> Rust text, WGSL text
 //! ```
 //!
 //! A law file ([`law`]) is read and checked into a [`law::ast::Law`]. The derivation (feature `derive`) differentiates
 //! its energy once for the stress and twice for the stress differential and lowers the stages into
 //! [`ir::KernelIr`], which [`ir::KernelIr::validate`] turns into the [`ir::ValidKernel`] that printers accept. Without
-//! the feature, [`derivation::Derivation`]s are read from the committed text. [`build`] is what a build script calls.
+//! the feature, [`derivation::Derivation`]s are read from the committed text. The printers ([`mod@print`]) write the same
+//! kernels as Rust over any number type ([`print::rust`]) and as complete WGSL compute passes ([`print::wgsl`]), which
+//! the Rust text holds as strings. [`build`] is what a build script calls.
 
 #[cfg(feature = "derive")]
 mod cas;

@@ -2,6 +2,7 @@
 //!
 //! No tolerance is chosen: [`rounding`] carries a bound of the rounding error along with every value.
 
+pub mod evaluate;
 pub mod point;
 pub mod random;
 pub mod rounding;

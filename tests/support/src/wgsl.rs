@@ -4,7 +4,7 @@
 use naga::back::pipeline_constants::process_overrides;
 use naga::proc::GlobalCtx;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
-use naga::{AddressSpace, BinaryOperator, Expression, Handle, Literal, MathFunction, Module, RelationalFunction};
+use naga::{AddressSpace, BinaryOperator, Expression, Handle, Literal, MathFunction, Module};
 use naga::{Scalar, ScalarKind, ShaderStage, StorageAccess, TypeInner};
 
 /// Storage buffers that WebGPU grants a shader stage.
@@ -25,7 +25,7 @@ pub enum Refusal {
     Double,
     /// An atomic: the order of sums, and with it their last digits, would change from run to run.
     Atomic,
-    /// `isNan`, `isInf`, or an expression compared with itself: a device may assume that there is no NaN.
+    /// An expression compared with itself: a device may assume that there is no NaN. (WGSL has no `isNan`.)
     NotANumber,
     /// A built-in function that is specified too loosely for a derivative.
     Function(String),
@@ -48,6 +48,12 @@ pub struct Bound {
     pub written: bool,
     /// Whether the entry point uses it.
     pub used: bool,
+}
+
+/// Words in lower case that WGSL keeps for itself or has given a meaning.
+pub fn words() -> impl Iterator<Item = &'static str> {
+    use naga::keywords::wgsl::{BUILTIN_IDENTIFIERS, RESERVED};
+    RESERVED.iter().chain(BUILTIN_IDENTIFIERS).copied().filter(|w| !w.contains(|c: char| c.is_ascii_uppercase()))
 }
 
 /// Checks a module with one entry point; gives what it binds, by binding number.
@@ -109,9 +115,6 @@ fn computable(expression: &Expression, all: &naga::Arena<Expression>) -> Result<
             M::Log | M::Log2 | M::Exp | M::Exp2 | M::Pow => Err(Refusal::Function(format!("{fun:?}").to_lowercase())),
             _ => Ok(()),
         },
-        Expression::Relational { fun: RelationalFunction::IsNan | RelationalFunction::IsInf, .. } => {
-            Err(Refusal::NotANumber)
-        }
         Expression::Binary { op, left, right } if compares(*op) && same(*left, *right, all) => Err(Refusal::NotANumber),
         _ => Ok(()),
     }

@@ -90,6 +90,7 @@ struct ElementPass {
     unused_0: u32,
     unused_1: u32,
 }
+
 ";
 
 const NODE_PASS: &str = "\
@@ -102,6 +103,7 @@ struct NodePass {
     // The factor of the masses.
     mass_factor: f32,
 }
+
 ";
 
 /// Declares the bindings of a module, numbered from 0 in their order, and the uniform's structure.

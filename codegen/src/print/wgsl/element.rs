@@ -26,15 +26,10 @@ enum Pass {
     Cauchy,
 }
 
-const PASSES: [(Pass, &str); 5] = [
-    (Pass::Energy, "energy"),
-    (Pass::Force, "force"),
-    (Pass::DForce, "dforce"),
-    (Pass::Diagonal, "diagonal"),
-    (Pass::Cauchy, "cauchy"),
-];
+/// The passes, in the order of [`NAMES`].
+const PASSES: [Pass; 5] = [Pass::Energy, Pass::Force, Pass::DForce, Pass::Diagonal, Pass::Cauchy];
 
-/// The names of the passes of [`law_shaders`], in their order.
+/// The names of the passes of [`law_shaders`], which are those of their point kernels, in their order.
 pub const NAMES: [&str; 5] = ["energy", "force", "dforce", "diagonal", "cauchy"];
 
 /// What one pass has and needs: decided once, for its bindings and for its text.
@@ -106,8 +101,8 @@ pub fn law_shaders(law: &Law, derivation: &Derivation, element: &ElementKernels)
         law.name,
         derivation.hash
     ));
-    PASSES.map(|(pass, name)| {
-        let needs = Needs { pass, point: derivation.kernel(name), element };
+    std::array::from_fn(|k| {
+        let needs = Needs { pass: PASSES[k], point: derivation.kernel(NAMES[k]), element };
         let bindings = needs.bindings();
         Shader { text: format!("{banner}\n{}", module(&needs, &bindings)), bindings }
     })

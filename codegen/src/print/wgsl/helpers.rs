@@ -1,9 +1,10 @@
 //! Functions that WGSL lacks or specifies too loosely for a derivative: logarithms, exponentials and powers in f32.
 //!
 //! The language's own `log` may be wrong by 2^-21 near 1, where the stress of a finite law needs every digit, and it has
-//! neither `log1p` nor `expm1`. Errors stated in the texts are in units in the last place, for additions,
-//! multiplications and divisions that round as IEEE 754 says; a device may round divisions worse (2.5 units). None
-//! of them relies on infinities, NaN, subnormal numbers or on an operation not being fused or reordered.
+//! neither `log1p` nor `expm1`. Errors are stated in units in the last place, where divisions round well; a device may
+//! add 2 units to a quotient. Measured: at most 0.9, 1.6, 1.8 and 2.9 units for ln, log1p, exp and expm1, on a device
+//! that reorders (lavapipe) and on the host. Nothing relies on infinities, NaN or subnormal numbers, nor on an operation
+//! that is not fused or reordered.
 
 /// A helper function; later ones may call earlier ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -103,11 +104,14 @@ fn log1p_(x: f32) -> f32 {
 }
 ";
 
+// x - k ln 2 cancels. In floating point, a device that reorders makes it k times an error of ln 2 (lavapipe does: 68 units
+// at exp(-72)); integers leave it no choice, and 24 binary places hold all of x beyond 1/2.
 const OCTAVES: &str = "\
-// The integer k nearest to x / ln 2, and x - k ln 2. The first part of ln 2 has 15 bits: its multiples are exact.
+// The integer k nearest to x / ln 2, and x - k ln 2, for |x| < 89. Integers count 2^-24, and ln 2 is nearly 11629080.
 fn octaves_(x: f32) -> vec2<f32> {
     let k = round(x * 1.442695f);
-    return vec2<f32>(k, fma(k, -0.0000014286068f, fma(k, -0.69314575f, x)));
+    let r = i32(round(x * 16777216.0f)) - i32(k) * 11629080;
+    return vec2<f32>(k, select(fma(k, 1.9046543e-9f, f32(r) * 0.000000059604645f), x, k == 0.0f));
 }
 ";
 
@@ -125,28 +129,25 @@ fn exp_series_(r: f32) -> f32 {
 ";
 
 const EXP: &str = "\
-// exp x, within 2 units in the last place; at most the largest f32, and 0 where the result would not be normal.
+// exp x, within 2 units in the last place; 0 below x = -87.3 and at most 2.4e38, its value at 88.375.
 fn exp_(x: f32) -> f32 {
-    let t = octaves_(clamp(x, -88.0f, 88.72283f));
-    let k = i32(t.x);
-    // Two factors, because 2^128 is no f32.
-    let half = k / 2;
-    let a = bitcast<f32>(bitcast<u32>(half + 127) << 23u);
-    let b = bitcast<f32>(bitcast<u32>(k - half + 127) << 23u);
-    let y = (1.0f + exp_series_(t.y)) * a * b;
-    return select(y, 0.0f, x < -87.33654f);
+    let t = octaves_(clamp(x, -87.3f, 88.375f));
+    let scale = bitcast<f32>(bitcast<u32>(i32(t.x) + 127) << 23u);
+    return select(scale * (1.0f + exp_series_(t.y)), 0.0f, x < -87.3f);
 }
 ";
 
 const EXPM1: &str = "\
-// exp(x) - 1, within 3 units in the last place: 2^k (exp(r) - 1) + (2^k - 1).
+// exp(x) - 1, within 3 units in the last place: 2^k (exp(r) - 1) + (2^k - 1), and at most 2.4e38.
 fn expm1_(x: f32) -> f32 {
     if abs(x) > 17.0f {
         return exp_(x) - 1.0f;
     }
     let t = octaves_(x);
+    let s = exp_series_(t.y);
     let scale = bitcast<f32>(bitcast<u32>(i32(t.x) + 127) << 23u);
-    return fma(scale, exp_series_(t.y), scale - 1.0f);
+    // Alone where k = 0: a device may compute the other as 2^k (s + 1) - 1.
+    return select(fma(scale, s, scale - 1.0f), s, t.x == 0.0f);
 }
 ";
 

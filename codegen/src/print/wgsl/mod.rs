@@ -28,6 +28,12 @@ pub struct Shader {
     pub bindings: Vec<Binding>,
 }
 
+/// A kernel as a function of its name, with the helper functions that it calls: for tests of what a text computes.
+pub fn function(kernel: &crate::ir::ValidKernel) -> String {
+    let helpers = helpers::texts(&function::helpers(kernel).collect::<Vec<_>>());
+    format!("{helpers}{}", function::function(kernel))
+}
+
 /// A shader as a Rust expression of the kernels crate's `Shader`.
 pub fn expression(shader: &Shader) -> TokenStream {
     let bindings = shader.bindings.iter().map(|b| format_ident!("{b:?}"));

@@ -20,7 +20,16 @@ const LANGUAGE: &str = "
     read write read_write function private workgroup uniform storage
     bitcast all any select abs acos acosh asin asinh atan atanh atan2 ceil clamp cos cosh cross degrees determinant
     distance dot exp exp2 floor fma fract frexp ldexp length log log2 max min mix modf normalize pow radians reflect
-    refract round saturate sign sin sinh smoothstep sqrt step tan tanh transpose trunc dpdx dpdy fwidth";
+    refract round saturate sign sin sinh smoothstep sqrt step tan tanh transpose trunc dpdx dpdy fwidth
+    texture_1d texture_2d texture_2d_array texture_3d texture_cube texture_cube_array texture_multisampled_2d
+    texture_depth_multisampled_2d texture_external texture_storage_1d texture_storage_2d
+    texture_storage_2d_array texture_storage_3d texture_depth_2d texture_depth_2d_array texture_depth_cube
+    texture_depth_cube_array rgba8unorm rgba8snorm rgba8uint rgba8sint rgba16unorm rgba16snorm rgba16uint
+    rgba16sint rgba16float rg8unorm rg8snorm rg8uint rg8sint rg16unorm rg16snorm rg16uint rg16sint rg16float
+    r32uint r32sint r32float rg32uint rg32sint rg32float rgba32uint rgba32sint rgba32float bgra8unorm r8unorm
+    r8snorm r8uint r8sint r16unorm r16snorm r16uint r16sint r16float rgb10a2unorm rgb10a2uint rg11b10ufloat
+    pack4x8snorm pack4x8unorm pack2x16snorm pack2x16unorm pack2x16float unpack4x8snorm unpack4x8unorm
+    unpack2x16snorm unpack2x16unorm unpack2x16float i64 u64 push_constant r64uint";
 
 /// Functions and variables of the texts around a kernel, except bindings and helpers, which say their own names.
 const OURS: &str = "
