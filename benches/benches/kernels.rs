@@ -5,41 +5,20 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use tensormass_benches::{beam, wave};
 use tensormass_runtime::backend::{Backend, ForceField};
 use tensormass_runtime::cpu::{CpuBackend, CpuField, Precision};
 use tensormass_runtime::model::build;
 use tensormass_runtime::scene::parse;
-use tensormass_runtime::{LawInfo, laws};
-
-/// A beam of 60,000 tetrahedra of one law, parameters in the middle of their ranges where no default is given.
-fn scene(info: &LawInfo) -> String {
-    let parameter = |p: &tensormass_runtime::ParameterInfo| {
-        let value = p.default.map_or_else(|| middle(p.range), |d| d[0]);
-        let text = if p.len == 1 { format!("{value:?}") } else { format!("{:?}", vec![value; p.len]) };
-        format!("{} = {text}", p.name)
-    };
-    let parameters: Vec<String> = info.parameters.iter().map(parameter).collect();
-    format!(
-        "[mesh]\nbeam = {{ size = [5, 1, 1], cells = [100, 10, 10] }}\n[[material]]\nlaw = \"{}\"\ndensity = 1000.0\n\
-         parameters = {{ {} }}\n[solver]\nintegrator = \"semi-implicit-euler\"\nstep = 1e-5\nduration = 1e-5\n",
-        info.name,
-        parameters.join(", ")
-    )
-}
-
-/// The geometric mean of a positive range, the arithmetic one of any other.
-fn middle((low, high): (f64, f64)) -> f64 {
-    if low > 0.0 { (low * high).sqrt() } else { 0.5 * (low + high) }
-}
+use tensormass_runtime::laws;
 
 fn kernels<R: Precision>(c: &mut Criterion, precision: &str) {
     for law in laws() {
-        let scene = parse(&scene(law.info), "bench.toml", &[]).expect("the scene is right");
+        let scene = parse(&beam(law.info, [100, 10, 10]), "bench.toml", &[]).expect("the scene is right");
         let model = build(&scene).expect("the scene can be built");
         let nodes = model.mesh.nodes();
         let backend = CpuBackend::<R>::new(nodes.len(), vec![]);
         let mut field = CpuField::<R>::new(&model.body);
-        let wave = |p: &[f64; 3]| [1e-3 * (p[0] + p[1]).sin(), 1e-3 * (2.0 * p[2]).cos(), 1e-3 * (p[0] * p[1]).sin()];
         let u = backend.upload(&nodes.iter().map(wave).collect::<Vec<_>>());
         let mut f = backend.zeros();
         let mut group = c.benchmark_group(format!("{precision}/{}", law.info.name));

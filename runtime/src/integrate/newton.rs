@@ -144,8 +144,9 @@ impl<B: Backend> Newton<B> {
         let judged = !linearised || equation.mass == 0.0;
         let reference = if judged { self.imbalance(system, equation, x) } else { 0.0 };
         system.backend.copy(equation.u, &mut self.u);
-        if judged && reference <= self.rounding(system, equation, 0.0) {
-            // Nothing but the rounding of K u is out of balance: a solution would chase noise.
+        if equation.mass == 0.0 && reference <= self.rounding(system, equation, 0.0) {
+            // Nothing but the rounding of K u is out of balance: a solution would chase noise. Where there is inertia, a
+            // force as small as that still accelerates the body, step after step.
             return Ok(report);
         }
         let exact = linearised || system.body.is_linear();
