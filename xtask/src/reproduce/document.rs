@@ -35,19 +35,22 @@ pub fn document(results: &Results) -> String {
          {:.0} steps, and a duration of about 1 s. The paper does not say that they are.\n\
          - f32, no damping, conjugate gradients to 1e-6.\n\n\
          The modulus is (reaction of the moved end / area) / (imposed strain). It is read at the end, as the paper seems to \
-         do, and as a mean over the hold's last whole wave periods of {:.4} s. *Amplitude* is half of what it varies by over \
-         these, *left* the same over the last period alone (where a period has steps enough).\n\n",
+         do, and as a mean over the last whole wave periods (of {:.4} s) in the second half of the hold. *Amplitude* is half of what \
+         it varies by over these, *left* the same over the last period alone (where a period has steps enough).\n\n",
         1.0 / TABLE_4_TOTAL,
         wave_period(),
     );
     text += "## The moduli\n\n";
     text += &moduli(results);
-    text += "\nAn average over rows is no precision: its errors have both signs where a row is too stiff, and cancel. In \
-             Table 1 the paper averages errors of both signs";
     let errors: Vec<f64> = ROWS[..3].iter().map(Row::error).collect();
     let (signed, plain) = averages(&errors);
-    text += &format!(" ({} %, where the mean of the magnitudes is {} %);", signed_percent(signed), percent(plain));
-    text += " besides, it averages over steps of which each user takes one. The rows are what counts.\n\n";
+    text += &format!(
+        "\nThe average rows are the paper's, and ours beside them. An average over rows is no measure of precision: errors of \
+         both signs cancel in it, as in Table 1 ({} %, where the mean of the magnitudes is {} %) and in our last values, and \
+         nobody computes with three steps at once. The rows are what counts.\n\n",
+        signed_percent(signed),
+        percent(plain)
+    );
     text += "## Run time\n\n";
     text += &run_times(results);
     text += "\nThe paper prints totals only. They are proportional to 1/h within a table, so every row has the same unknown \
@@ -68,7 +71,7 @@ pub fn document(results: &Results) -> String {
     text += &stored_positions();
     text += "\n## What explains the paper's errors\n\n";
     text += &conclusions::conclusions(results);
-    text
+    wrapped(&text)
 }
 
 fn software_note(name: &str) -> &'static str {
@@ -82,12 +85,42 @@ fn software_note(name: &str) -> &'static str {
 
 /// Of a ratio, in percent, with its sign.
 pub fn signed_percent(ratio: f64) -> String {
-    if ratio.is_nan() { "-".to_string() } else { format!("{:+.4}", 100.0 * ratio) }
+    let sign = if ratio >= 0.0 { "+" } else { "-" };
+    if ratio.is_nan() { "-".to_string() } else { format!("{sign}{}", percent(ratio.abs())) }
 }
 
 /// Of a magnitude, in percent.
 pub fn percent(ratio: f64) -> String {
-    if ratio.is_nan() { "-".to_string() } else { format!("{:.4}", 100.0 * ratio) }
+    match 100.0 * ratio {
+        p if p.is_nan() => "-".to_string(),
+        p if p < 1e-3 => format!("{p:.6}"),
+        p => format!("{p:.4}"),
+    }
+}
+
+/// Prose in lines of at most 120 characters; tables, headings and comments as they are.
+fn wrapped(page: &str) -> String {
+    let mut text = String::new();
+    for line in page.lines() {
+        let mut length = 0;
+        let indent = if line.starts_with("- ") { "  " } else { "" };
+        let whole = line.starts_with(['|', '#', '<']);
+        for word in line.split(' ') {
+            let size = word.chars().count();
+            if length == 0 {
+                text += word;
+                length = size;
+            } else if whole || length + 1 + size <= 120 {
+                text = text + " " + word;
+                length += 1 + size;
+            } else {
+                text = text + "\n" + indent + word;
+                length = indent.len() + size;
+            }
+        }
+        text.push('\n');
+    }
+    text
 }
 
 /// A Markdown table.
@@ -305,7 +338,9 @@ mod tests {
         assert_eq!(grouped(98_775_400.4), "98,775,400");
         assert_eq!(grouped(123.0), "123");
         assert_eq!(signed_percent(-0.0122), "-1.2200");
+        assert_eq!(signed_percent(0.000_000_34), "+0.000034");
         assert_eq!(percent(f64::NAN), "-");
+        assert_eq!(wrapped(&"- abc def".repeat(20)).lines().map(str::len).max(), Some(118));
         assert_eq!(table(&["a", "b"], &[vec!["1".into(), "2".into()]]), "| a | b |\n| --- | --- |\n| 1 | 2 |\n");
     }
 

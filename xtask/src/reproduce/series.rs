@@ -15,7 +15,7 @@ pub struct Series {
 pub struct Hold {
     /// The last value.
     pub end: f64,
-    /// Mean over the last whole wave periods of the hold.
+    /// Mean over the last whole wave periods that fit into the second half of the hold.
     pub mean: f64,
     /// Half of what the values vary by over the same periods.
     pub amplitude: f64,
@@ -57,10 +57,11 @@ impl Series {
         kept.map(|p| ((p.0 / interval).round() as u64, p.1)).collect()
     }
 
-    /// What the values say after the ramp's end; without a hold of one wave period, of its last value alone.
+    /// What the values say after the ramp's end; without a hold of two wave periods, of its last value alone.
     pub fn hold(&self, ramp: f64, period: f64) -> Hold {
         let (last, end) = self.points.last().copied().unwrap_or((f64::NAN, f64::NAN));
-        let periods = ((last - ramp) / period).floor();
+        // The first half holds the impulse that stops the beam: with long steps, all of it is in one of few values.
+        let periods = ((last - ramp) / 2.0 / period).floor();
         let after = |time: f64| self.points.iter().filter(move |p| p.0 > time).map(|p| p.1);
         let half = |values: &mut dyn Iterator<Item = f64>| {
             let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (v.min(l), v.max(h)));
@@ -84,16 +85,16 @@ mod tests {
     #[test]
     fn a_hold_is_read_over_whole_periods_after_the_ramp() {
         let mut series = Series::default();
-        for k in 1..=350 {
+        for k in 1..=450 {
             let time = f64::from(k) * 0.01;
-            // A ramp that would spoil the mean; then 2 + sin, whose amplitude is 1.
-            let value = if time <= 1.0 { 100.0 } else { 2.0 + (std::f64::consts::TAU * time).sin() };
+            // A ramp and a beginning that would spoil the mean; then 2 + sin, whose amplitude is 1.
+            let value = if time <= 2.0 { 100.0 } else { 2.0 + (std::f64::consts::TAU * time).sin() };
             series.push(time, value);
         }
-        let hold = series.hold(1.0, 1.0);
+        let hold = series.hold(0.0, 1.0);
         assert!((hold.mean - 2.0).abs() < 1e-9 && (hold.amplitude - 1.0).abs() < 1e-9, "{hold:?}");
         assert!((hold.left - 1.0).abs() < 1e-9 && (hold.end - 2.0).abs() < 1e-9, "{hold:?}");
-        assert!(series.hold(3.0, 1.0).mean.is_nan(), "half a period is no hold");
+        assert!(series.hold(3.0, 1.0).mean.is_nan(), "one and a half periods are no hold");
     }
 
     #[test]
