@@ -16,7 +16,9 @@ pub const RAMP: f64 = 0.48;
 /// See [`RAMP`].
 pub const DURATION: f64 = 0.96;
 /// Run times are measured over at most so many steps.
-const TIMED_STEPS: f64 = 1000.0;
+const TIMED_STEPS: f64 = 500.0;
+/// And in the fastest of so many runs: other work on the machine only ever adds.
+const TIMED_RUNS: usize = 3;
 
 /// One run to make.
 #[derive(Debug, Clone)]
@@ -158,9 +160,8 @@ impl Tensormass {
     pub fn step_time(&self, spec: &Spec, device: &str, start: f64) -> Result<f64, Failure> {
         let duration = spec.duration.min(TIMED_STEPS * spec.step);
         let spec = spec.clone().lasting(spec.ramp, duration).with("probe=[]");
-        let summary = self.finish(&spec, device)?;
-        let steps = summary["steps"].as_f64().unwrap_or(f64::NAN);
-        Ok((summary["wall_time_s"].as_f64().unwrap_or(f64::NAN) - start).max(0.0) / steps * 1e3)
+        let (seconds, steps) = self.fastest(&spec, device)?;
+        Ok((seconds - start).max(0.0) / steps * 1e3)
     }
 
     /// Seconds that a run of one explicit step takes: reading, critical steps, pipelines.
@@ -169,7 +170,20 @@ impl Tensormass {
     /// The run fails.
     pub fn start_time(&self, device: &str) -> Result<f64, Failure> {
         let spec = Spec::new(Scheme::SemiImplicit, 0.0001).lasting(RAMP, 0.0001).with("probe=[]");
-        Ok(self.finish(&spec, device)?["wall_time_s"].as_f64().unwrap_or(f64::NAN))
+        Ok(self.fastest(&spec, device)?.0)
+    }
+
+    /// Run time in s of the fastest of some equal runs, and their number of steps.
+    fn fastest(&self, spec: &Spec, device: &str) -> Result<(f64, f64), Failure> {
+        let mut fastest = (f64::INFINITY, f64::NAN);
+        for _ in 0..TIMED_RUNS {
+            let summary = self.finish(spec, device)?;
+            let number = |key: &str| summary[key].as_f64().unwrap_or(f64::NAN);
+            if number("wall_time_s") < fastest.0 {
+                fastest = (number("wall_time_s"), number("steps"));
+            }
+        }
+        Ok(fastest)
     }
 
     fn finish(&self, spec: &Spec, device: &str) -> Result<Value, Failure> {
