@@ -267,10 +267,16 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {{
 {gate}    let invocations = groups.x * groups.y * work_group_size;
-    var e = (group.y * groups.x + group.x) * work_group_size + local;
-    for (var i = 0u; i < elements_per_invocation && e < element_pass.elements; i++) {{
+    let e = (group.y * groups.x + group.x) * work_group_size + local;
+    if e < element_pass.elements {{
         element(e);
-        e += invocations;
+    }}
+    // Not one loop for all: where an invocation has one element, nothing of a loop may be left.
+    for (var i = 1u; i < elements_per_invocation; i++) {{
+        let next = e + i * invocations;
+        if next < element_pass.elements {{
+            element(next);
+        }}
     }}
 }}
 "
