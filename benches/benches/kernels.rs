@@ -8,9 +8,9 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use tensormass_benches::{beam, wave};
 use tensormass_runtime::backend::{Backend, ForceField};
 use tensormass_runtime::cpu::{CpuBackend, CpuField, Precision};
+use tensormass_runtime::laws;
 use tensormass_runtime::model::build;
 use tensormass_runtime::scene::parse;
-use tensormass_runtime::laws;
 
 fn kernels<R: Precision>(c: &mut Criterion, precision: &str) {
     for law in laws() {

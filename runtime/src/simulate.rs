@@ -240,6 +240,10 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
                 self.system.check_bounded(&self.state)
             });
             if let Err(e) = done {
+                if let SolveError::Device(_) = e {
+                    // What the device returned of this step is not known to be good.
+                    (self.state.step, self.state.time) = (k - 1, self.step * (k - 1) as f64);
+                }
                 return Ok(Ending::Failed(e));
             }
             if let Err(e) = self.record(results)? {
@@ -369,7 +373,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
     }
 
     fn summary(&mut self, ending: &Ending, results: &Results, wall: f64) -> Value {
-        let energies = self.energies().ok();
+        let energies = self.energies().ok().filter(|_| self.system.backend.check().is_ok());
         let scale = self.model.scale;
         let probes: serde_json::Map<String, Value> =
             self.model.recorder.names().iter().zip(&results.last).map(|((n, _), v)| (n.clone(), json!(v))).collect();
