@@ -233,10 +233,10 @@ fn own_functions_are_as_accurate_as_stated() {
             |x| x[0].ln_1p(),
             |_| 2.0,
         ),
-        worst("exp_", evenly(-87.3, 88.37, N).chain(small()).map(one), |x| x[0].exp(), |_| 2.0),
+        worst("exp_", evenly(-87.33, 88.72, N).chain(small()).map(one), |x| x[0].exp(), |_| 2.0),
         worst(
             "expm1_",
-            evenly(-30.0, 88.37, N).chain(small()).chain(evenly(-1.0, 1.0, N)).map(one),
+            evenly(-30.0, 88.72, N).chain(small()).chain(evenly(-1.0, 1.0, N)).map(one),
             |x| x[0].exp_m1(),
             |_| 3.0,
         ),
@@ -246,12 +246,12 @@ fn own_functions_are_as_accurate_as_stated() {
                 .into_iter()
                 .flat_map(|b| octaves(1e-12, 1e12, N / 4).chain(evenly(0.5, 2.0, N / 4)).map(move |a| vec![a, b])),
             |x| x[0].powf(x[1]),
-            |x| 3.0 + 2.0 * (x[1] * x[0].ln()).abs(),
+            |x| 3.0 + 5.0 * (x[1] * x[0].ln()).abs(),
         ),
     ];
     eprintln!("greatest errors of ln, log1p, exp, expm1, powf as shares of what they state: {found:.2?}");
     // Outside: saturation, not infinity.
     let exp = |x: f32| helper("exp_", &[x]);
     assert_eq!(exp(-1e30), 0.0);
-    assert!(exp(1e30).is_finite() && exp(1e30) > 2.3e38);
+    assert!(exp(1e30).is_finite() && exp(1e30) > 3.4e38);
 }

@@ -24,6 +24,10 @@ pub mod generated {
     include!(concat!(env!("OUT_DIR"), "/kernels.rs"));
 }
 
+/// The folder of this build's generated text: tests find there the derivations that it was printed from.
+#[doc(hidden)]
+pub const GENERATED: &str = env!("TENSORMASS_GENERATED");
+
 /// Every law of this build, by name.
 pub fn laws() -> &'static [LawEntry] {
     generated::LAWS

@@ -195,6 +195,7 @@ fn math(fun: MathFunction, x: &[f32]) -> f32 {
         (MathFunction::Sqrt, &[a]) => a.sqrt(),
         (MathFunction::Abs, &[a]) => a.abs(),
         (MathFunction::Round, &[a]) => a.round_ties_even(),
+        (MathFunction::Max, &[a, b]) => a.max(b),
         (MathFunction::Clamp, &[a, low, high]) => a.clamp(low, high),
         (fun, x) => panic!("unsupported {fun:?} of {x:?}"),
     }
@@ -226,6 +227,7 @@ fn binary(op: BinaryOperator, a: Value, b: Value) -> Value {
         (B::Add, I32(a), I32(b)) => I32(a.wrapping_add(b)),
         (B::Subtract, I32(a), I32(b)) => I32(a.wrapping_sub(b)),
         (B::Multiply, I32(a), I32(b)) => I32(a.wrapping_mul(b)),
+        (B::Divide, I32(a), I32(b)) => I32(a / b),
         (B::ShiftRight, I32(a), U32(b)) => I32(a >> b),
         (B::Subtract, U32(a), U32(b)) => U32(a.wrapping_sub(b)),
         (B::ShiftLeft, U32(a), U32(b)) => U32(a << b),

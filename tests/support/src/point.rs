@@ -110,8 +110,7 @@ impl Point {
         let material = derivation.kernel("material").interpret(&[(Input::Parameters, exact.as_slice())]);
         // In f32 the constants are rounded once more.
         let bounds = material.expect("one value a parameter component").remove(0).into_iter();
-        let constants =
-            bounds.zip(&values).map(|(b, &v)| Rounded { value: v, error: b.error + v.abs() }).collect::<Vec<_>>();
+        let constants = bounds.zip(&values).map(|(b, &v)| Rounded::new(v, b.error + v.abs())).collect::<Vec<_>>();
         let double = Compiled::new((entry.f64)(), &values);
         let single = Compiled::new((entry.f32)(), &values);
         Self { entry, derivation, parameters, double, single, constants }
@@ -137,7 +136,7 @@ impl Point {
     }
 
     fn bounded<const N: usize>(&self, values: [f64; N], bounds: &[Rounded]) -> [Rounded; N] {
-        std::array::from_fn(|k| Rounded { value: values[k], error: bounds[k].error })
+        std::array::from_fn(|k| Rounded::new(values[k], bounds[k].error))
     }
 
     /// W.

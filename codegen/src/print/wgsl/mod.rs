@@ -16,6 +16,7 @@ use quote::{format_ident, quote};
 
 pub use binding::Binding;
 pub use element::{NAMES, law_shaders};
+pub use helpers::all as helper_functions;
 pub use nodes::{node_product, node_sum};
 pub use words::is_free;
 

@@ -1,0 +1,217 @@
+//! Sums at nodes that elements share, products with the operator, bodies in pages, and the options that change nothing.
+
+use std::sync::Arc;
+
+use tensormass_runtime::backend::{Backend, ForceField, Operator, REGISTERS, RUNNING, SUM, Scalar, Update};
+use tensormass_runtime::body::{Body, Constraint};
+use tensormass_runtime::gpu::{Gpu, GpuOptions};
+use tensormass_runtime::history::History;
+use tensormass_runtime::mesh::beam;
+use tensormass_runtime::{LawEntry, laws};
+use tensormass_testing::random::Rng;
+
+use crate::states::{Analysis, Bound, Kernel, Vector, batches, body, compare, rest, vectors};
+use crate::support::gpu::test_device;
+use crate::{On, on_cpu, on_gpu};
+
+/// Bytes that divide the body into pages.
+const SMALL: u64 = 12 << 10;
+/// Factors of sums; numbers of f32.
+const FACTORS: [(Kernel, f64); 3] = [(Kernel::Force, 1.0), (Kernel::DForce, -0.75), (Kernel::Diagonal, 1.5)];
+/// Factors of the masses and of the stiffness.
+const OPERATOR: (f64, f64) = (3.25, 0.625);
+/// Where the tests' update keeps the sum.
+const KEPT: usize = 7;
+
+/// A beam of all laws, one material and a material each, whose displacement strains and turns it a little.
+struct Shared {
+    body: Body,
+    u: Vector,
+    du: Vector,
+    old: Vector,
+}
+
+impl Shared {
+    fn new(seed: u64) -> Self {
+        let mut rng = Rng::new(seed);
+        let mesh = beam([4.0, 1.0, 1.5], [8, 3, 3], [0.5, -1.0, 2.0]).expect("a beam");
+        let elements: Vec<[u32; 4]> = mesh.tets().iter().map(|t| t.map(|n| n.0)).collect();
+        let all: Vec<&'static LawEntry> = laws().iter().collect();
+        let batches = batches(&all, elements.len(), &mut rng);
+        let mut body = body(elements, &rest(&mesh), batches, &mut rng);
+        let nodes = mesh.nodes().len();
+        // Every combination of components is imposed at some node, and none at others.
+        let imposed =
+            (0..nodes as u32).flat_map(|n| (0..3).filter(move |c| ((n % 11) >> c) & 1 == 1).map(move |c| (n, c)));
+        body.constraints = imposed.map(|(node, component)| Constraint { node, component, motion: 0 }).collect();
+        body.motions = vec![History::constant(0.0)];
+        // Edges are about 0.4 long: strains of up to about 0.1.
+        let u = vectors(nodes, 0.02, &mut rng);
+        Self { body, u, du: vectors(nodes, 1.0, &mut rng), old: vectors(nodes, 10.0, &mut rng) }
+    }
+
+    /// old + factor times the sum of each node's slots; bodies in `pages` add a sum a page.
+    fn sums(&self, kernel: Kernel, factor: f64, analysis: &Analysis, pages: usize, old: &[Bound]) -> Vec<Bound> {
+        let mut sums: Vec<Sum> = old.iter().map(|_| Sum::default()).collect();
+        for batch in &self.body.batches {
+            let values = analysis.batch(kernel, &self.body, batch, &self.u, &self.du);
+            for (&e, slots) in batch.elements.iter().zip(values.chunks(12)) {
+                for (node, slot) in self.body.elements[e as usize].iter().zip(slots.chunks(3)) {
+                    (0..3).for_each(|c| sums[3 * *node as usize + c].add(slot[c]));
+                }
+            }
+        }
+        sums.iter().zip(old).map(|(sum, old)| sum.added(factor, *old, pages as f64)).collect()
+    }
+
+    fn is_imposed(&self, k: usize) -> bool {
+        self.body.constraints.iter().any(|c| 3 * c.node as usize + usize::from(c.component) == k)
+    }
+}
+
+/// The slots of one component of a node.
+#[derive(Default)]
+struct Sum {
+    terms: f64,
+    value: f64,
+    magnitudes: f64,
+    errors: f64,
+}
+
+impl Sum {
+    fn add(&mut self, slot: Bound) {
+        self.terms += 1.0;
+        self.value += slot.value;
+        self.magnitudes += slot.value.abs();
+        self.errors += slot.error;
+    }
+
+    /// old + factor times the sum. Each page sums its slots, n - 1 roundings for all in all, multiplies, and adds, each
+    /// of them at most the magnitudes' sum.
+    fn added(&self, factor: f64, old: Bound, pages: f64) -> Bound {
+        let roundings = (self.terms - 1.0).max(0.0) + 1.0 + pages;
+        let error = factor.abs() * (self.errors + roundings * self.magnitudes);
+        Bound::new(old.value + factor * self.value, old.error + pages * old.value.abs() + error)
+    }
+}
+
+/// A vector's imposed components after ones are added and they are projected out: 0 if it still has its mask.
+fn imposed_after_projection<B: Backend>(backend: &B, body: &Shared, y: &mut B::Vector) -> Vec<f64> {
+    backend.axpy(1.0, &backend.upload(&vec![[1.0; 3]; body.u.len()]), y);
+    backend.project(y);
+    let all = backend.download(y).into_flattened();
+    (0..all.len()).filter(|&k| body.is_imposed(k)).map(|k| all[k]).collect()
+}
+
+/// Keeps the sum that is pending.
+struct Keep;
+
+impl Update for Keep {
+    const SUMS: bool = true;
+    fn apply<S: Scalar>(registers: &mut [S; REGISTERS]) {
+        registers[KEPT] = registers[SUM];
+    }
+}
+
+/// y = A x and x . y, where the solver runs; y before.
+fn product<B: Backend, F: ForceField<B>>(on: &mut On<B, F>, body: &Shared, running: f64) -> (Vec<f64>, f64) {
+    let On { backend, field } = on;
+    let masses: Vector = body.body.masses.iter().map(|&m| [m, 2.0 * m, 4.0 * m]).collect();
+    let (masses, x, mut y) = (backend.upload(&masses), backend.upload(&body.du), backend.upload(&body.old));
+    let mut registers = [0.0; REGISTERS];
+    registers[RUNNING] = running;
+    let mut registers = backend.registers(registers);
+    let u = backend.upload(&body.u);
+    field.prepare(backend, &u);
+    let operator = Operator { masses: &masses, mass: OPERATOR.0, stiffness: OPERATOR.1 };
+    field.product(backend, &operator, &x, &mut y, &mut registers);
+    backend.update::<Keep>(&mut registers);
+    let values = backend.download(&y).into_flattened();
+    let imposed = imposed_after_projection(backend, body, &mut y);
+    assert!(imposed.iter().all(|&y| y == 0.0), "the product has lost its mask");
+    (values, backend.read(&registers)[KEPT])
+}
+
+#[test]
+fn sums_keep_masks() {
+    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let body = Shared::new(8);
+    let On { backend, mut field } = on_gpu(&gpu, &body.body, GpuOptions::default());
+    let (u, mut f) = (backend.upload(&body.u), backend.zeros());
+    field.add_force(&backend, &u, &mut f).expect("inside the domain");
+    let imposed = imposed_after_projection(&backend, &body, &mut f);
+    assert_eq!(imposed, vec![0.0; body.body.constraints.len()]);
+}
+
+/// Force, differential, diagonal and product of a body in at least this many pages; their bits for another run.
+fn check(gpu: &Arc<Gpu>, body: &Shared, options: GpuOptions, analysis: &Analysis, least: usize) -> Vec<Vec<f64>> {
+    let mut cpu = on_cpu(&body.body);
+    let mut on = on_gpu(gpu, &body.body, options);
+    let pages = on.field.pages();
+    assert!(if least > 1 { pages >= least } else { pages == 1 }, "{pages} pages, not {least}");
+    let mut all = vec![];
+    let old: Vec<Bound> = body.old.iter().flatten().copied().map(Bound::exact).collect();
+    for (kernel, factor) in FACTORS {
+        let wanted = cpu.values(kernel, &body.u, &body.du, factor, &body.old);
+        let found = on.values(kernel, &body.u, &body.du, factor, &body.old);
+        let what = format!("{kernel:?} at nodes, {pages} pages");
+        let bounds = body.sums(kernel, factor, analysis, pages, &old);
+        println!("{what}: {:.3} of the bound", compare(&what, &found, &wanted, &bounds));
+        all.push(found);
+    }
+    let (wanted, _) = product(&mut cpu, body, 1.0);
+    let (found, dot) = product(&mut on, body, 1.0);
+    let masses = body.body.masses.iter().flat_map(|&m| [m, 2.0 * m, 4.0 * m]).map(Bound::exact);
+    let x: Vec<Bound> = body.du.iter().flatten().copied().map(Bound::exact).collect();
+    let first: Vec<Bound> = masses.zip(&x).map(|(m, &x)| Bound::exact(OPERATOR.0) * m * x).collect();
+    // Slots hold -K x.
+    let mut bounds = body.sums(Kernel::DForce, -OPERATOR.1, analysis, pages, &first);
+    let imposed = |k: &usize| body.is_imposed(*k);
+    (0..bounds.len()).filter(imposed).for_each(|k| bounds[k] = Bound::exact(0.0));
+    let what = format!("product, {pages} pages");
+    println!("{what}: {:.3} of the bound", compare(&what, &found, &wanted, &bounds));
+    // Of the product as it was found. A term is rounded as a product, meets two others of its node, then halves of its
+    // group, then the sums of groups.
+    let groups = body.body.masses.len().div_ceil(options.work_group_size as usize);
+    let depth = 1.0 + 2.0 + f64::from(options.work_group_size).log2() + groups.div_ceil(256) as f64 + 8.0;
+    let terms = || x.iter().zip(&found).map(|(x, y)| x.value * y);
+    let bound = Bound::new(terms().sum(), depth * terms().map(f64::abs).sum::<f64>());
+    println!("x . y, {what}: {:.3} of the bound", compare(&what, &[dot], &[bound.value], &[bound]));
+    all.extend([found, vec![dot]]);
+    all
+}
+
+#[test]
+fn sums_at_nodes_are_those_of_f64_rounded() {
+    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let (body, analysis) = (Shared::new(5), Analysis::new());
+    for (least, binding_bytes) in [(1, None), (3, Some(SMALL))] {
+        let run = || check(&gpu, &body, GpuOptions { binding_bytes, ..GpuOptions::default() }, &analysis, least);
+        let first = run();
+        assert!(first == run(), "a second run gives other bits");
+    }
+}
+
+#[test]
+fn a_solver_that_has_stopped_is_left_alone() {
+    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let body = Shared::new(6);
+    for binding_bytes in [None, Some(SMALL)] {
+        let mut on = on_gpu(&gpu, &body.body, GpuOptions { binding_bytes, ..GpuOptions::default() });
+        assert_eq!(product(&mut on, &body, 0.0).0, body.old.as_flattened());
+    }
+}
+
+#[test]
+fn sums_do_not_depend_on_how_elements_are_dealt_to_invocations() {
+    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let body = Shared::new(7);
+    let force = |options| on_gpu(&gpu, &body.body, options).fresh(Kernel::Force, &body.u, &body.du);
+    let usual = force(GpuOptions::default());
+    for work_group_size in [32, 64, 128, 256] {
+        for elements_per_invocation in [1, 2, 3, 7] {
+            let options = GpuOptions { work_group_size, elements_per_invocation, ..GpuOptions::default() };
+            assert!(force(options) == usual, "{options:?}");
+        }
+    }
+}
