@@ -6,8 +6,7 @@
 /// 1, 2, 4 for x, y, z), which no kernel changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Binding {
-    /// `uniform`, 16 bytes: elements of the pass (`u32`), constants between one element's set and the next (`u32`, 0
-    /// where all share one), two unused.
+    /// `uniform`, 16 bytes: elements of the pass (`u32`), the rest unused.
     ElementPass,
     /// `uniform`, 16 bytes: nodes (`u32`), whether the pass is the first to write its product (`u32`), the factor of the
     /// sum of slots (`f32`), the factor of the masses (`f32`).
@@ -65,8 +64,9 @@ impl Binding {
 /// A compute shader with one entry point, `main`.
 #[derive(Debug, Clone, Copy)]
 pub struct Shader {
-    /// WGSL; the pipeline constants `work_group_size` and (element passes only) `elements_per_invocation` are its
-    /// parameters.
+    /// WGSL; its parameters are pipeline constants: `work_group_size`; in element passes `elements_per_invocation`; where
+    /// it binds [`Binding::Constants`], `constants_stride`, constants between one element's set and the next, 0 where
+    /// all share one.
     pub text: &'static str,
     /// What it binds.
     pub bindings: &'static [Binding],

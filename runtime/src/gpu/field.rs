@@ -55,8 +55,8 @@ pub struct GpuField {
     state: Option<GpuVector>,
     gate: Memory,
     elements: usize,
-    /// Compiled passes, by the place of their text.
-    kernels: HashMap<*const u8, Rc<Kernel>>,
+    /// Compiled passes, by the place of their text and the stride of their constants.
+    kernels: HashMap<(*const u8, u32), Rc<Kernel>>,
     work_group_size: u32,
     elements_per_invocation: u32,
 }
@@ -103,9 +103,9 @@ impl GpuField {
         self.pages.len()
     }
 
-    fn kernel(&mut self, shader: &Shader, label: &str) -> Rc<Kernel> {
+    fn kernel(&mut self, shader: &Shader, stride: u32, label: &str) -> Rc<Kernel> {
         let Self { kernels, recorder, work_group_size, elements_per_invocation, .. } = self;
-        let made = kernels.entry(shader.text.as_ptr()).or_insert_with(|| {
+        let made = kernels.entry((shader.text.as_ptr(), stride)).or_insert_with(|| {
             let access = |b: &Binding| match (b.is_uniform(), b.is_written()) {
                 (true, _) => Access::Uniform,
                 (false, true) => Access::Write,
@@ -116,6 +116,9 @@ impl GpuField {
             if shader.bindings.contains(&Binding::ElementPass) {
                 constants.push(("elements_per_invocation", f64::from(*elements_per_invocation)));
             }
+            if shader.bindings.contains(&Binding::Constants) {
+                constants.push(("constants_stride", f64::from(stride)));
+            }
             recorder.kernel(label, shader.text, &bindings, &constants)
         });
         Rc::clone(made)
@@ -125,13 +128,14 @@ impl GpuField {
     fn element_passes(&mut self, page: usize, pass: fn(&LawShaders) -> &Shader, bound: &Bound) {
         for range in 0..self.pages[page].ranges.len() {
             let shader = pass(self.pages[page].ranges[range].law.shaders);
-            let kernel = self.kernel(shader, self.pages[page].ranges[range].law.info.name);
+            let Range { stride, law, .. } = self.pages[page].ranges[range];
+            let kernel = self.kernel(shader, stride, law.info.name);
             let range = &self.pages[page].ranges[range];
             let storage: Vec<&Memory> = shader.bindings[1..].iter().map(|&b| self.buffer(b, range, bound)).collect();
             let count = range.elements.len();
             let invocations = count.div_ceil(self.elements_per_invocation as usize);
             let groups = self.recorder.groups(invocations, self.work_group_size);
-            self.recorder.dispatch(&kernel, [count as u32, range.stride, 0, 0], &storage, groups);
+            self.recorder.dispatch(&kernel, [count as u32, 0, 0, 0], &storage, groups);
         }
     }
 
@@ -161,7 +165,7 @@ impl GpuField {
 
     /// Pass 2 of one page: y += factor times the sum of each node's slots.
     fn node_pass(&mut self, page: usize, nodes: usize, factor: f64, y: &GpuVector) {
-        let kernel = self.kernel(&NODE_SUM, "sum of slots");
+        let kernel = self.kernel(&NODE_SUM, 0, "sum of slots");
         let numbers = [nodes as u32, 0, (factor as f32).to_bits(), 0];
         let storage = [&self.slots, &self.pages[page].offsets, y.memory()];
         let groups = self.recorder.groups(nodes, self.work_group_size);
@@ -397,7 +401,7 @@ impl ForceField<GpuBackend> for GpuField {
         let groups = self.recorder.groups(nodes, self.work_group_size);
         for page in 0..self.pages.len() {
             self.element_passes(page, |s| &s.dforce, &bound);
-            let kernel = self.kernel(&NODE_PRODUCT, "product at nodes");
+            let kernel = self.kernel(&NODE_PRODUCT, 0, "product at nodes");
             // The slots hold -K x.
             let factors = [-operator.stiffness, operator.mass].map(|f| (f as f32).to_bits());
             let numbers = [nodes as u32, u32::from(page == 0), factors[0], factors[1]];

@@ -58,6 +58,8 @@ struct List {
     pass: Option<wgpu::ComputePass<'static>>,
     encoder: Option<wgpu::CommandEncoder>,
     uniforms: Vec<u8>,
+    /// The numbers of the last submission, which are on the device: those of a solver's iterations are often the same.
+    written: Vec<u8>,
     offsets: HashMap<Numbers, u32>,
     values: Vec<f32>,
 }
@@ -241,7 +243,10 @@ impl Recorder {
         list.pass = None;
         let Some(encoder) = list.encoder.take() else { return };
         let queue = &self.gpu.queue;
-        queue.write_buffer(&self.uniforms, 0, &list.uniforms);
+        if !list.written.starts_with(&list.uniforms) {
+            queue.write_buffer(&self.uniforms, 0, &list.uniforms);
+            list.written = list.uniforms.clone();
+        }
         if !list.values.is_empty() {
             queue.write_buffer(&self.values.buffer, 0, bytemuck::cast_slice(&list.values));
         }

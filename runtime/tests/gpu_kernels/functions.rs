@@ -24,7 +24,8 @@ const COUNT: usize = 200_000;
 const PASS: &str = "
 override work_group_size: u32 = 64u;
 override elements_per_invocation: u32 = 1u;
-struct ElementPass { elements: u32, stride: u32, unused_0: u32, unused_1: u32 }
+override constants_stride: u32 = 0u;
+struct ElementPass { elements: u32, unused_0: u32, unused_1: u32, unused_2: u32 }
 @group(0) @binding(0) var<uniform> element_pass: ElementPass;
 @group(0) @binding(1) var<storage, read> constants: array<f32>;
 @group(0) @binding(2) var<storage, read_write> energies: array<f32>;
@@ -37,8 +38,8 @@ fn main(
 ) {
     let e = elements_per_invocation * ((group.y * groups.x + group.x) * work_group_size + local);
     if e < element_pass.elements {
-        let a = constants[element_pass.stride * e];
-        let b = constants[element_pass.stride * e + 1u];
+        let a = constants[constants_stride * e];
+        let b = constants[constants_stride * e + 1u];
         energies[e] = FUNCTION;
     }
 }

@@ -85,10 +85,9 @@ const ELEMENT_PASS: &str = "\
 struct ElementPass {
     // Elements of the pass.
     elements: u32,
-    // Constants between one element's set and the next; 0 where all share one.
-    stride: u32,
     unused_0: u32,
     unused_1: u32,
+    unused_2: u32,
 }
 
 ";

@@ -109,7 +109,8 @@ pub fn law_shaders(law: &Law, derivation: &Derivation, element: &ElementKernels)
 }
 
 fn module(needs: &Needs, bindings: &[Binding]) -> String {
-    let mut out = format!("{OVERRIDES}\n{}", declarations(bindings));
+    let stride = if bindings.contains(&Binding::Constants) { STRIDE } else { "" };
+    let mut out = format!("{OVERRIDES}{stride}\n{}", declarations(bindings));
     out += &helpers::texts(&function::helpers(needs.point).collect::<Vec<_>>());
     if needs.shape_gradients() {
         out += &shape_gradients();
@@ -140,6 +141,11 @@ const OVERRIDES: &str = "\
 override work_group_size: u32 = 64u;
 // Elements that one invocation computes, one after the other.
 override elements_per_invocation: u32 = 1u;
+";
+
+const STRIDE: &str = "\
+// Constants between one element's set and the next; 0 where all share one, which a compiler can then load once.
+override constants_stride: u32 = 0u;
 ";
 
 fn shape_gradients() -> String {
@@ -196,7 +202,7 @@ fn one_element(needs: &Needs) -> String {
         line("let volume = rest[e].w;");
     }
     if let Some((_, count)) = function::read_inputs(needs.point).find(|(role, _)| *role == Input::Constants) {
-        line("let first = element_pass.stride * e;");
+        line("let first = constants_stride * e;");
         let values: Vec<String> = (0..count).map(|k| format!("constants[{}]", offset("first", k))).collect();
         line(&format!("let c = {};", function::array(&values, "    ")));
     }
