@@ -137,13 +137,15 @@ pub struct ConjugateGradient<B: Backend> {
     d: B::Vector,
     q: B::Vector,
     registers: B::Registers,
+    /// Iterations that the next solution may need: a little more than the last one took.
+    expected: u32,
 }
 
 impl<B: Backend> ConjugateGradient<B> {
     /// Work vectors for a body.
     pub fn new(backend: &B) -> Self {
         let [r, z, d, q] = std::array::from_fn(|_| backend.zeros());
-        Self { r, z, d, q, registers: backend.registers([0.0; REGISTERS]) }
+        Self { r, z, d, q, registers: backend.registers([0.0; REGISTERS]), expected: u32::MAX }
     }
 
     /// Solves A x = b for the free components of x; its constrained components are given and kept.
@@ -162,7 +164,7 @@ impl<B: Backend> ConjugateGradient<B> {
         x: &mut B::Vector,
         limits: CgLimits,
     ) -> CgReport {
-        let Self { r, z, d, q, registers } = self;
+        let Self { r, z, d, q, registers, expected } = self;
         let mut first = [0.0; REGISTERS];
         first[RUNNING] = 1.0;
         first[TARGET] = limits.tolerance * limits.tolerance;
@@ -181,7 +183,8 @@ impl<B: Backend> ConjugateGradient<B> {
         backend.copy(z, d);
         let mut left = limits.max_iterations;
         loop {
-            let now = left.min(backend.iterations_between_readings());
+            // Steps that take few iterations each shall not submit many that do nothing.
+            let now = left.min(backend.iterations_between_readings()).min(*expected);
             for _ in 0..now {
                 field.product(backend, operator, d, q, registers);
                 backend.update::<Advance>(registers);
@@ -194,8 +197,11 @@ impl<B: Backend> ConjugateGradient<B> {
             // A device that has failed reads NaN, and there is nothing to go on with.
             let runs = s[RUNNING] > 0.0;
             if left == 0 || !runs {
-                return report(&s);
+                let report = report(&s);
+                *expected = report.iterations.saturating_add(1);
+                return report;
             }
+            *expected = u32::MAX;
         }
     }
 }
