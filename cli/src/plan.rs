@@ -1,8 +1,11 @@
 //! `tensormass plan`: what a scene will compute, and what it leaves out.
 
 use clap::Args;
+use tensormass_runtime::device::{DeviceChoice, DeviceError};
 use tensormass_runtime::model::build;
-use tensormass_runtime::plan::{Plan, integrator_name, precision_name};
+use tensormass_runtime::plan::{Layout, Plan, integrator_name, precision_name};
+use tensormass_runtime::scene::Precision;
+use tensormass_runtime::target::Target;
 
 use crate::failure::Failure;
 use crate::run::SceneArguments;
@@ -13,6 +16,9 @@ use crate::text;
 pub struct Arguments {
     #[command(flatten)]
     scene: SceneArguments,
+    /// For which device: gpu plans for any GPU, whether there is one or not.
+    #[arg(long, value_name = "auto|cpu|gpu|gpu:NAME", default_value_t = DeviceChoice::Auto)]
+    device: DeviceChoice,
     /// Print the plan as JSON instead of text.
     #[arg(long)]
     json: bool,
@@ -22,16 +28,22 @@ pub struct Arguments {
 pub fn call(arguments: &Arguments) -> Result<(), Failure> {
     let scene = arguments.scene.load()?;
     let model = build(&scene).map_err(|e| Failure::bad_input(e.to_string()))?;
-    let plan = Plan::new(&scene, &model);
+    let layout = layout(&arguments.device, scene.solver.precision)
+        .map_err(|e| Failure::bad_input(format!("--device {}: {e}", arguments.device)))?;
+    let plan = Plan::new(&scene, &model, layout);
     if arguments.json {
         return text::print_json(&plan.to_json());
     }
     let mut out = format!(
-        "{} nodes, {} elements; {}, {}, cpu\n",
+        "{} nodes, {} elements; {}, {}, {}\n",
         model.mesh.nodes().len(),
         plan.elements,
         integrator_name(scene.solver.integrator),
-        precision_name(scene.solver.precision)
+        precision_name(scene.solver.precision),
+        match layout {
+            Layout::Cpu => "cpu",
+            Layout::Gpu => "gpu",
+        }
     );
     for line in plan.quality.to_string().lines() {
         out += &format!("  {line}\n");
@@ -65,4 +77,18 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
         eprintln!("warning: {warning}");
     }
     text::print(&out)
+}
+
+/// What a choice plans for. No device is opened but to find out what `auto` takes.
+fn layout(choice: &DeviceChoice, precision: Precision) -> Result<Layout, DeviceError> {
+    match (choice, precision) {
+        (DeviceChoice::Cpu, _) => Ok(Layout::Cpu),
+        (DeviceChoice::Gpu | DeviceChoice::Named(_), Precision::F32) => Ok(Layout::Gpu),
+        (DeviceChoice::Gpu | DeviceChoice::Named(_), Precision::F64) => Err(DeviceError::Precision),
+        (DeviceChoice::Auto, _) => Ok(match Target::open(choice, precision)? {
+            Target::Cpu => Layout::Cpu,
+            #[cfg(feature = "gpu")]
+            Target::Gpu(..) => Layout::Gpu,
+        }),
+    }
 }

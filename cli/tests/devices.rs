@@ -25,6 +25,14 @@ fn json(drivers: bool) -> Value {
     serde_json::from_str(&out).unwrap_or_else(|e| panic!("{e}: {out}"))
 }
 
+/// Says that a test is skipped for want of an adapter, or fails if one is required.
+fn skipped(test: &str) {
+    let required = std::env::var("TENSORMASS_REQUIRE_GPU").is_ok_and(|v| !matches!(v.trim(), "" | "0"));
+    assert!(!required, "TENSORMASS_REQUIRE_GPU is set, and there is no GPU adapter");
+    // Not eprintln: the test harness would keep the line of a test that passes to itself.
+    let _ = writeln!(std::io::stderr(), "skipped: no GPU adapter (install mesa-vulkan-drivers), 1 test: {test}");
+}
+
 /// Runs a scene in f32 on this device: the exit status and the error output.
 fn run_on(device: &str, drivers: bool) -> (Option<i32>, String) {
     let out = tempfile::tempdir().expect("a temporary folder");
@@ -108,17 +116,33 @@ fn without_a_driver_everything_is_said_and_auto_is_the_cpu() {
 fn a_name_that_no_gpu_has_ends_with_2_and_the_names_there_are() {
     let shown = json(true);
     let Some(first) = shown["devices"].get(0) else {
-        let required = std::env::var("TENSORMASS_REQUIRE_GPU").is_ok_and(|v| !matches!(v.trim(), "" | "0"));
-        assert!(!required, "TENSORMASS_REQUIRE_GPU is set, and there is no GPU adapter");
-        // Not eprintln: the test harness would keep the line of a test that passes to itself.
-        let _ = writeln!(
-            std::io::stderr(),
-            "skipped: no GPU adapter (install mesa-vulkan-drivers), 1 test: a_name_that_no_gpu_has"
-        );
+        skipped("a_name_that_no_gpu_has");
         return;
     };
     let (status, err) = run_on("gpu:no such device", true);
     assert_eq!(status, Some(2), "{err}");
     assert!(err.contains("error: --device gpu:no such device: no GPU is named `no such device`\n  = help: "), "{err}");
     assert!(err.contains(&format!("`{}`", str(&first["name"]))), "{err}");
+}
+
+/// A run on a GPU, a software one too: the summary names it, and a software one is warned of.
+#[test]
+fn a_run_on_a_gpu_names_the_device() {
+    let shown = json(true);
+    let Some(first) = shown["devices"].as_array().and_then(|all| all.iter().find(|d| d["unusable"].is_null())) else {
+        skipped("a_run_on_a_gpu");
+        return;
+    };
+    let out = tempfile::tempdir().expect("a temporary folder");
+    let folder = out.path().to_str().expect("a temporary folder's name is text");
+    let arguments = ["run", "scenes/traction.toml", "--device", "gpu", "--out", folder];
+    let coarse = ["--set", "mesh.beam.cells=[5, 2, 2]", "--set", "solver.duration=0.08"];
+    let (status, text, err) = call(&[&arguments[..], &coarse].concat(), true);
+    assert_eq!(status, Some(0), "{err}");
+    assert!(text.starts_with("done: 2 steps"), "{text}");
+    let summary = std::fs::read_to_string(out.path().join("summary.json")).expect("a run writes its summary");
+    let summary: Value = serde_json::from_str(&summary).expect("JSON");
+    assert_eq!((&summary["device"], &summary["precision"]), (&first["name"], &"f32".into()));
+    assert!(summary["device_counts"]["dispatches"].as_u64() > Some(0), "{summary}");
+    assert_eq!(err.contains("is a software device"), first["kind"] == "software", "{err}");
 }

@@ -242,6 +242,11 @@ fn plan_says_what_is_computed_and_what_is_left_out() {
     let explicit = plan(&["--set", "solver.integrator=central-difference", "--set", "solver.step=1e-5"]);
     assert_eq!(kernels(&explicit), 1, "an explicit integrator needs no tangent");
     assert!(explicit["bytes_per_element"].as_f64() < implicit["bytes_per_element"].as_f64());
+    // A GPU keeps more bytes an element, and six kernels an iteration; none has to be there to plan for it.
+    let on_gpu = plan(&["--device", "gpu", "--precision", "f32"]);
+    let on_cpu = plan(&["--device", "cpu", "--precision", "f32"]);
+    assert!(on_gpu["bytes_per_element"].as_f64() > on_cpu["bytes_per_element"].as_f64(), "{on_gpu}");
+    assert_eq!(on_gpu["passes"].to_string().matches("CG iteration").count(), 6, "{on_gpu}");
     let left_out = explicit["left_out"].to_string();
     assert!(left_out.contains("tangent stiffness") && left_out.contains("contact"), "{left_out}");
 }

@@ -10,6 +10,15 @@ use crate::scene::{Integrator, Precision, Scene};
 /// Operations of the linear tetrahedron around a point kernel, counted in its generated text.
 use tensormass_kernels::generated::tetrahedron_p1::{CONTRACT_OPERATIONS, GRADIENT_OPERATIONS};
 
+/// How buffers are laid out: they differ between the CPU and GPUs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Layout {
+    /// In memory, in the scene's precision.
+    Cpu,
+    /// On a device: f32, four numbers where three would do, slots by node.
+    Gpu,
+}
+
 /// One law of a plan.
 #[derive(Debug, Clone)]
 pub struct PlannedLaw {
@@ -61,8 +70,8 @@ pub fn precision_name(precision: Precision) -> &'static str {
 }
 
 impl Plan {
-    /// The plan of a scene.
-    pub fn new(scene: &Scene, model: &Model) -> Self {
+    /// The plan of a scene on a CPU or a GPU.
+    pub fn new(scene: &Scene, model: &Model, layout: Layout) -> Self {
         let implicit = match scene.solver.integrator {
             Integrator::ImplicitEuler | Integrator::Static => true,
             Integrator::SemiImplicitEuler | Integrator::CentralDifference => false,
@@ -70,23 +79,53 @@ impl Plan {
         let laws =
             model.body.batches.iter().map(|b| law(b.law.info, b.elements.len(), b.per_element, implicit)).collect();
         let (nodes, elements) = (model.body.masses.len(), model.body.elements.len());
-        let real = match scene.solver.precision {
-            Precision::F32 => 4,
-            Precision::F64 => 8,
-        };
         let vectors = if implicit { 20 } else { 6 };
         let constants: usize = model.body.batches.iter().map(|b| b.constants.len()).sum();
-        let buffers = vec![
-            ("element nodes", 16 * elements),
-            ("rest data", 10 * real * elements),
-            ("material constants", real * constants),
-            ("partial forces", 12 * real * elements),
-            ("node slots", 4 * (4 * elements + nodes + 1)),
-            ("state and work vectors", vectors * 3 * real * nodes),
-        ];
+        let with_domain = model.body.batches.iter().filter(|b| b.law.info.domain.is_some());
+        let margins: usize = with_domain.map(|b| b.elements.len()).sum();
+        let buffers = match layout {
+            Layout::Cpu => {
+                let real = match scene.solver.precision {
+                    Precision::F32 => 4,
+                    Precision::F64 => 8,
+                };
+                vec![
+                    ("element nodes", 16 * elements),
+                    ("rest data", 10 * real * elements),
+                    ("material constants", real * constants),
+                    ("partial forces", 12 * real * elements),
+                    ("node slots", 4 * (4 * elements + nodes + 1)),
+                    ("state and work vectors", vectors * 3 * real * nodes),
+                ]
+            }
+            Layout::Gpu => vec![
+                ("element nodes", 16 * elements),
+                ("rest data", 48 * elements),
+                ("material constants", 4 * constants),
+                ("partial forces", 64 * elements),
+                ("slots of elements and nodes", 16 * elements + 4 * (nodes + 1)),
+                ("margins of domains", 4 * margins),
+                ("state and work vectors", (vectors + 1) * 16 * nodes),
+            ],
+        };
+        let buffers = buffers.into_iter().filter(|(_, bytes)| *bytes > 0).collect();
         let mut passes = vec!["elements: partial forces", "nodes: sum of slots"];
+        if layout == Layout::Gpu && margins > 0 {
+            passes.push("elements: count of those outside their law's domain");
+        }
         if implicit {
-            passes.extend(["elements: diagonal", "CG: elements: partial force differentials, nodes: sum, vectors"]);
+            passes.push("elements: diagonal");
+            match layout {
+                Layout::Cpu => passes.push("CG: elements: partial force differentials, nodes: sum, vectors"),
+                Layout::Gpu => passes.extend([
+                    "CG iteration 1: elements: partial force differentials",
+                    "CG iteration 2: nodes: product, and its partial sums with the direction",
+                    "CG iteration 3: step length, and whether the curvature is positive",
+                    "CG iteration 4: nodes: solution, residual, and partial sums of its norm",
+                    "CG iteration 5: turn, and whether to stop",
+                    "CG iteration 6: nodes: next direction",
+                ]),
+            }
         }
         passes.push("nodes: update of the state");
         let (modelled, left_out) = scope(scene, model, implicit);

@@ -17,7 +17,7 @@ use crate::gpu::{GpuBackend, GpuField};
 use crate::integrate::{CentralDifference, ImplicitEuler, NewtonLimits, SemiImplicitEuler, SolverSettings, Statics};
 use crate::model::{BuildError, Model, build};
 use crate::output::{OutputError, ProbeTable, create_folder, remove_file, write_json_atomic};
-use crate::plan::{Plan, integrator_name, precision_name};
+use crate::plan::{Layout, Plan, integrator_name, precision_name};
 use crate::probe::{Energies, Needs, Snapshot};
 use crate::scene::{self, Scene};
 use crate::step_limit::{StepLimits, element_limit, power_limit};
@@ -128,7 +128,7 @@ pub fn run_on(
         (Target::Gpu(gpu, options), scene::Precision::F32) => {
             let backend = GpuBackend::new(Arc::clone(gpu), &model.body, *options)?;
             let field = GpuField::new(&backend, &model.body)?;
-            let mut run = Run::new(scene, model, backend, field);
+            let mut run = Run::new(scene, model, backend, field, Layout::Gpu);
             run.warnings.extend(target.warning());
             run.all(out, observer)
         }
@@ -151,6 +151,7 @@ struct Run<'a, B: Backend, F: ForceField<B>> {
     cost: StepReport,
     warnings: Vec<String>,
     limits: Option<StepLimits>,
+    layout: Layout,
 }
 
 /// Runs a scene on the CPU.
@@ -163,11 +164,11 @@ fn on_cpu<R: Precision>(
     let body = &model.body;
     let backend = CpuBackend::<R>::new(body.masses.len(), body.constraints.clone());
     let field = CpuField::<R>::new(body);
-    Run::new(scene, model, backend, field).all(out, observer)
+    Run::new(scene, model, backend, field, Layout::Cpu).all(out, observer)
 }
 
 impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
-    fn new(scene: &'a Scene, mut model: Model, backend: B, field: F) -> Self {
+    fn new(scene: &'a Scene, mut model: Model, backend: B, field: F, layout: Layout) -> Self {
         let body = model.body.clone();
         let integrator = integrator(scene, &backend, body.masses.len());
         let (seconds, steps) = stepping(scene);
@@ -186,6 +187,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
             cost: StepReport::default(),
             warnings,
             limits: None,
+            layout,
         }
     }
 
@@ -377,7 +379,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         let scale = self.model.scale;
         let probes: serde_json::Map<String, Value> =
             self.model.recorder.names().iter().zip(&results.last).map(|((n, _), v)| (n.clone(), json!(v))).collect();
-        let plan = Plan::new(self.scene, &self.model);
+        let plan = Plan::new(self.scene, &self.model, self.layout);
         let status = match ending {
             Ending::Done => "done",
             Ending::Failed(_) => "failed",
