@@ -1,145 +1,25 @@
-//! Runs a scene: steps a model through time and writes probes, frames and the summary.
+//! One run on one backend: steps, records, and what is written of them.
 
 use std::path::Path;
-#[cfg(feature = "gpu")]
-use std::sync::Arc;
 use std::time::Instant;
 
 use serde_json::{Value, json};
 
 use crate::backend::{Backend, ForceField, LeftDomain};
-use crate::cg::CgLimits;
-use crate::cpu::{CpuBackend, CpuField, Precision};
-use crate::device::DeviceError;
 use crate::frames::{FrameData, Frames};
-#[cfg(feature = "gpu")]
-use crate::gpu::{GpuBackend, GpuField};
-use crate::integrate::{CentralDifference, ImplicitEuler, NewtonLimits, SemiImplicitEuler, SolverSettings, Statics};
-use crate::model::{BuildError, Model, build};
+use crate::model::Model;
 use crate::output::{OutputError, ProbeTable, create_folder, remove_file, write_json_atomic};
 use crate::plan::{Layout, Plan, integrator_name, precision_name};
 use crate::probe::{Energies, Needs, Snapshot};
 use crate::scene::{self, Scene};
 use crate::step_limit::{StepLimits, element_limit, power_limit};
-use crate::system::{Integrator, SolveError, State, StepReport, System};
-use crate::target::Target;
+use crate::system::{SolveError, State, StepReport, System};
 
-/// Why a run could not be carried out at all.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// The scene cannot be computed.
-    #[error(transparent)]
-    Build(#[from] BuildError),
-    /// Results cannot be written.
-    #[error(transparent)]
-    Output(#[from] OutputError),
-    /// The device cannot compute the scene.
-    #[error(transparent)]
-    Device(#[from] DeviceError),
-    /// Threads cannot be started.
-    #[error("cannot start {threads} threads: {reason}; set solver.threads to fewer")]
-    Threads {
-        /// Threads asked for.
-        threads: u32,
-        /// What the system said.
-        reason: String,
-    },
-}
+use super::setup::{Stepper, integrator, stepping};
+use super::{Ending, Observer, Outcome, RunError};
 
-/// How a run ended. Results were written in every case.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Ending {
-    /// All steps were taken.
-    Done,
-    /// The simulation failed; what was computed before is kept.
-    Failed(SolveError),
-    /// The observer asked to stop.
-    Interrupted,
-}
-
-/// A finished run.
-#[derive(Debug)]
-pub struct Outcome {
-    /// How it ended.
-    pub ending: Ending,
-    /// What `summary.json` says.
-    pub summary: Value,
-    /// Name, unit and last value of each probe.
-    pub probes: Vec<(String, &'static str, f64)>,
-    /// The critical steps in s, for integrators that step through time.
-    pub limits: Option<StepLimits>,
-    /// What is allowed but looks wrong.
-    pub warnings: Vec<String>,
-}
-
-/// Follows a run.
-pub trait Observer {
-    /// Something that the user should know before the run goes on.
-    fn warning(&mut self, text: &str);
-    /// The critical steps in s are known; nothing has been stepped yet.
-    fn limits(&mut self, limits: StepLimits);
-    /// This many of all steps are taken.
-    fn progress(&mut self, step: u64, steps: u64);
-    /// Whether to stop after the current step.
-    fn interrupted(&self) -> bool;
-}
-
-/// An observer that follows nothing.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Silent;
-
-impl Observer for Silent {
-    fn warning(&mut self, _: &str) {}
-    fn limits(&mut self, _: StepLimits) {}
-    fn progress(&mut self, _: u64, _: u64) {}
-    fn interrupted(&self) -> bool {
-        false
-    }
-}
-
-/// Runs a scene on the CPU and writes its results into a folder, if one is given.
-///
-/// # Errors
-/// See [`RunError`]; a simulation that fails on its way is not an error but [`Ending::Failed`].
-pub fn run(scene: &Scene, out: Option<&Path>, observer: &mut (dyn Observer + Send)) -> Result<Outcome, RunError> {
-    run_on(&Target::Cpu, scene, out, observer)
-}
-
-/// As [`run`], on a device.
-///
-/// # Errors
-/// See [`RunError`]; a simulation that fails on its way, or whose device does, is not an error but [`Ending::Failed`].
-pub fn run_on(
-    target: &Target,
-    scene: &Scene,
-    out: Option<&Path>,
-    observer: &mut (dyn Observer + Send),
-) -> Result<Outcome, RunError> {
-    let model = build(scene)?;
-    let threads = scene.solver.threads;
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads as usize)
-        .build()
-        .map_err(|e| RunError::Threads { threads, reason: e.to_string() })?;
-    pool.install(|| match (target, scene.solver.precision) {
-        (Target::Cpu, scene::Precision::F32) => on_cpu::<f32>(scene, model, out, observer),
-        (Target::Cpu, scene::Precision::F64) => on_cpu::<f64>(scene, model, out, observer),
-        #[cfg(feature = "gpu")]
-        (Target::Gpu(gpu, options), scene::Precision::F32) => {
-            let backend = GpuBackend::new(Arc::clone(gpu), &model.body, *options)?;
-            let field = GpuField::new(&backend, &model.body)?;
-            let mut run = Run::new(scene, model, backend, field, Layout::Gpu);
-            run.warnings.extend(target.warning());
-            run.all(out, observer)
-        }
-        #[cfg(feature = "gpu")]
-        (Target::Gpu(..), scene::Precision::F64) => Err(DeviceError::Precision.into()),
-    })
-}
-
-type Stepper<B, F> = Box<dyn Integrator<B, F>>;
-
-struct Run<'a, B: Backend, F: ForceField<B>> {
+/// A run of a scene on a backend.
+pub(super) struct Run<'a, B: Backend, F: ForceField<B>> {
     scene: &'a Scene,
     model: Model,
     system: System<B, F>,
@@ -149,26 +29,13 @@ struct Run<'a, B: Backend, F: ForceField<B>> {
     step: f64,
     steps: u64,
     cost: StepReport,
-    warnings: Vec<String>,
+    pub(super) warnings: Vec<String>,
     limits: Option<StepLimits>,
     layout: Layout,
 }
 
-/// Runs a scene on the CPU.
-fn on_cpu<R: Precision>(
-    scene: &Scene,
-    model: Model,
-    out: Option<&Path>,
-    observer: &mut (dyn Observer + Send),
-) -> Result<Outcome, RunError> {
-    let body = &model.body;
-    let backend = CpuBackend::<R>::new(body.masses.len(), body.constraints.clone());
-    let field = CpuField::<R>::new(body);
-    Run::new(scene, model, backend, field, Layout::Cpu).all(out, observer)
-}
-
 impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
-    fn new(scene: &'a Scene, mut model: Model, backend: B, field: F, layout: Layout) -> Self {
+    pub(super) fn new(scene: &'a Scene, mut model: Model, backend: B, field: F, layout: Layout) -> Self {
         let body = model.body.clone();
         let integrator = integrator(scene, &backend, body.masses.len());
         let (seconds, steps) = stepping(scene);
@@ -191,7 +58,8 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         }
     }
 
-    fn all(mut self, out: Option<&Path>, observer: &mut (dyn Observer + Send)) -> Result<Outcome, RunError> {
+    /// Takes all steps and writes the results.
+    pub(super) fn all(mut self, out: Option<&Path>, observer: &mut (dyn Observer + Send)) -> Result<Outcome, RunError> {
         let started = Instant::now();
         let mut results = Results::create(self.scene, &self.model, out)?;
         self.measure_limits(observer);
@@ -472,55 +340,5 @@ impl Results {
             _ => Some(Frames::create(out, &model.mesh, &scene.output.fields)?),
         };
         Ok(Self { probes: Some(probes), frames, last: vec![] })
-    }
-}
-
-/// Step in s and number of steps; a static scene without a step takes its ramps to their ends at once.
-fn stepping(scene: &Scene) -> (f64, u64) {
-    let steps = scene.solver.steps();
-    let step = match (scene.solver.step, scene.solver.duration) {
-        (Some(step), Some(_)) => step,
-        (_, Some(duration)) => duration,
-        (_, None) => ramps_end(scene).max(1.0),
-    };
-    (step, steps)
-}
-
-/// The time in s at which the last ramp of a scene ends.
-fn ramps_end(scene: &Scene) -> f64 {
-    let loads = scene.load.iter().filter_map(|l| match l {
-        scene::Load::Gravity { ramp, .. } | scene::Load::Traction { ramp, .. } | scene::Load::Force { ramp, .. } => {
-            ramp.as_ref().map(scene::Ramp::end)
-        }
-    });
-    let motions = scene.boundary.iter().flat_map(|b| match b {
-        scene::Boundary::Fixed { .. } => vec![],
-        scene::Boundary::Moved { motion, .. } => [&motion.x, &motion.y, &motion.z]
-            .into_iter()
-            .filter_map(|h| match h {
-                Some(scene::History::Ramp(ramp)) => Some(ramp.end()),
-                Some(scene::History::Velocity(_)) | None => None,
-            })
-            .collect(),
-    });
-    loads.chain(motions).fold(0.0, f64::max)
-}
-
-fn integrator<B: Backend + 'static, F: ForceField<B> + 'static>(
-    scene: &Scene,
-    backend: &B,
-    nodes: usize,
-) -> Stepper<B, F> {
-    let solver = &scene.solver;
-    let settings = SolverSettings {
-        cg: CgLimits { tolerance: solver.cg.tolerance, max_iterations: solver.cg.max_iterations },
-        preconditioner: solver.cg.preconditioner,
-        newton: NewtonLimits { tolerance: solver.newton.tolerance, max_iterations: solver.newton.max_iterations },
-    };
-    match solver.integrator {
-        scene::Integrator::ImplicitEuler => Box::new(ImplicitEuler::new(backend, nodes, settings)),
-        scene::Integrator::SemiImplicitEuler => Box::new(SemiImplicitEuler::new(backend)),
-        scene::Integrator::CentralDifference => Box::new(CentralDifference::new(backend)),
-        scene::Integrator::Static => Box::new(Statics::new(backend, nodes, settings)),
     }
 }
