@@ -54,7 +54,7 @@ impl Frames {
     pub fn needs(&self) -> Needs {
         let stresses = self.fields.iter().any(|f| matches!(f, Field::Cauchy | Field::VonMises));
         let energies = self.fields.contains(&Field::EnergyDensity);
-        Needs { reactions: false, energies, stresses }
+        Needs { displacement: true, reactions: false, energies, stresses }
     }
 
     /// Writes one frame.

@@ -27,6 +27,8 @@ impl Energies {
 /// What some probes or fields read of a state.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Needs {
+    /// The displacement of the nodes.
+    pub displacement: bool,
     /// Forces at the nodes.
     pub reactions: bool,
     /// Energies.
@@ -38,7 +40,7 @@ pub struct Needs {
 /// A state in SI units, with what was needed of it.
 #[derive(Debug, Clone, Default)]
 pub struct Snapshot {
-    /// Displacement of each node in m.
+    /// Displacement of each node in m, if needed.
     pub displacement: Vec<[f64; 3]>,
     /// Force that the supports exert on each node in N: what balances elements and loads, without inertia.
     pub reactions: Vec<[f64; 3]>,
@@ -142,8 +144,12 @@ impl Recorder {
         let mut needs = Needs::default();
         for reader in &self.readers {
             match reader {
-                Reader::Displacement { .. } | Reader::Volume(_) => {}
-                Reader::Reaction { .. } | Reader::Modulus { .. } => needs.reactions = true,
+                Reader::Displacement { .. } | Reader::Volume(_) => needs.displacement = true,
+                Reader::Reaction { .. } => needs.reactions = true,
+                Reader::Modulus { .. } => {
+                    needs.displacement = true;
+                    needs.reactions = true;
+                }
                 Reader::Energy(_) => needs.energies = true,
                 Reader::Stress { .. } => needs.stresses = true,
             }

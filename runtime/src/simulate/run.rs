@@ -181,7 +181,10 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
 
     fn snapshot(&mut self, needs: Needs) -> Result<Snapshot, SolveError> {
         let scale = self.model.scale;
-        let mut snapshot = Snapshot { displacement: self.in_si(&self.state.u, scale.length), ..Snapshot::default() };
+        let mut snapshot = Snapshot::default();
+        if needs.displacement {
+            snapshot.displacement = self.in_si(&self.state.u, scale.length);
+        }
         if needs.reactions {
             let mut f = self.system.backend.zeros();
             self.system.force(&self.state.u, self.state.time, &mut f)?;
