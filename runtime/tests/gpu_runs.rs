@@ -236,6 +236,23 @@ fn a_lost_device_keeps_the_results() {
     }
 }
 
+/// Options that no device takes: the run is the same as with the nearest that all do.
+#[test]
+fn options_are_made_valid() {
+    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let scene = scene::<&str>(&bent(&laws()[0], "integrator = \"implicit-euler\"\nstep = 0.01\nduration = 0.02"), &[]);
+    let probes = |work_group_size, least| {
+        let (elements_per_invocation, iterations_per_submission) = (least, least);
+        let options =
+            GpuOptions { work_group_size, elements_per_invocation, iterations_per_submission, binding_bytes: None };
+        let target = Target::Gpu(Arc::clone(&gpu), options);
+        run_on(&target, &scene, None, &mut Silent).unwrap_or_else(|e| panic!("{e}")).probes
+    };
+    assert_eq!(probes(0, 0), probes(1, 1));
+    assert_eq!(probes(100, 1), probes(128, 1));
+    assert_eq!(probes(u32::MAX, 1), probes(256, 1));
+}
+
 #[test]
 fn f64_is_refused() {
     let Some(gpu) = test_device().map(Arc::new) else { return };

@@ -19,7 +19,8 @@ use super::trace;
 /// No motion: a component that is not constrained.
 const FREE: u32 = u32::MAX;
 
-/// What a user of a GPU may tune. Nothing here changes what is computed but the last digits of sums.
+/// What a user of a GPU may tune. Nothing here changes what is computed but the last digits of sums. Values that no device
+/// takes are replaced by the nearest that all do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct GpuOptions {
     /// Invocations of a work group of the element and node passes (Faure et al. 2012, Fig. 4): a power of two, at most
@@ -36,6 +37,18 @@ pub struct GpuOptions {
 impl Default for GpuOptions {
     fn default() -> Self {
         Self { work_group_size: 64, elements_per_invocation: 1, iterations_per_submission: 32, binding_bytes: None }
+    }
+}
+
+impl GpuOptions {
+    /// The nearest options that every device takes.
+    fn valid(self) -> Self {
+        Self {
+            work_group_size: self.work_group_size.clamp(1, GROUP).next_power_of_two(),
+            elements_per_invocation: self.elements_per_invocation.max(1),
+            iterations_per_submission: self.iterations_per_submission.max(1),
+            binding_bytes: self.binding_bytes,
+        }
     }
 }
 
@@ -96,6 +109,7 @@ impl GpuBackend {
     /// # Errors
     /// A vector over the body's nodes is larger than the device can bind, or the device has failed.
     pub fn new(gpu: Arc<Gpu>, body: &Body, options: GpuOptions) -> Result<Self, DeviceError> {
+        let options = options.valid();
         let recorder = Rc::new(Recorder::new(gpu, body.motions.len()));
         let nodes = body.masses.len();
         let (origin, constrained) = constrained(nodes, &body.constraints);
