@@ -77,7 +77,8 @@ impl GpuField {
     pub fn new(backend: &GpuBackend, body: &Body) -> Result<Self, DeviceError> {
         let recorder = Rc::clone(backend.recorder());
         let options = backend.options();
-        let limit = options.binding_bytes.unwrap_or(recorder.gpu().limits().storage_binding_bytes);
+        let limit = recorder.gpu().limits().storage_binding_bytes;
+        let limit = options.binding_bytes.map_or(limit, |bytes| bytes.min(limit));
         let parts = paged(body, limit);
         let pages = parts.iter().map(|p| Page::new(&recorder, body, p)).collect::<Result<Vec<_>, _>>()?;
         let largest = pages.iter().map(Page::elements).max().unwrap_or(0);
@@ -224,8 +225,9 @@ impl GpuField {
     fn output(&mut self, u: &GpuVector, pass: fn(&LawShaders) -> &Shader, width: usize) -> Vec<f64> {
         for page in 0..self.pages.len() {
             for range in &mut self.pages[page].ranges {
-                if range.output.is_none() {
-                    let bytes = 4 * widest_output(range.elements.len());
+                // As large as the widest pass that was asked for: energies alone take a ninth of stresses.
+                let bytes = 4 * (width * range.elements.len()) as u64;
+                if range.output.as_ref().is_none_or(|output| output.bytes() < bytes) {
                     range.output = self.recorder.memory("values of elements", bytes).ok();
                 }
             }
@@ -244,11 +246,6 @@ impl GpuField {
         }
         values
     }
-}
-
-/// Numbers of the widest output pass: nine an element, fewer bytes than its slots take.
-fn widest_output(elements: usize) -> u64 {
-    9 * elements as u64
 }
 
 /// A part of one law's elements: the batch, and which of its elements.

@@ -28,6 +28,13 @@ pub(super) struct Memory {
     buffer: wgpu::Buffer,
 }
 
+impl Memory {
+    /// Its size.
+    pub(super) fn bytes(&self) -> u64 {
+        self.buffer.size()
+    }
+}
+
 /// A compiled shader.
 #[derive(Debug)]
 pub(super) struct Kernel {
