@@ -13,7 +13,7 @@ use crate::device::DeviceError;
 
 use super::device::Gpu;
 use super::recorder::{Kernel, Memory, Numbers, Recorder};
-use super::shaders::{Access, GROUP, Operation, update_arguments, update_text};
+use super::shaders::{Access, Argument, GROUP, Operation, update_arguments, update_text};
 use super::trace;
 
 /// No motion: a component that is not constrained.
@@ -173,14 +173,21 @@ impl GpuBackend {
         GpuVector { memory: kept.unwrap_or_else(|| Rc::new(made())), unused: Rc::clone(&self.unused) }
     }
 
+    /// Compiles a module of ours: the numbers of the pass, then its arguments.
+    fn kernel(&self, label: &str, text: &str, arguments: &[Argument]) -> Rc<Kernel> {
+        let accesses = arguments.iter().map(|(_, _, access)| *access);
+        let bindings: Vec<Access> = std::iter::once(Access::Uniform).chain(accesses).collect();
+        self.recorder.kernel(label, text, &bindings, &[("work_group_size", GROUP.into())])
+    }
+
     /// Records an operation over `count` things.
     pub(super) fn run(&self, operation: Operation, numbers: Numbers, storage: &[&Memory]) -> [u32; 2] {
-        let kernel = Rc::clone(self.operations.borrow_mut().entry(operation).or_insert_with(|| {
-            let accesses = operation.arguments().into_iter().map(|(_, _, access)| access);
-            let bindings: Vec<Access> = std::iter::once(Access::Uniform).chain(accesses).collect();
-            let label = format!("{operation:?}");
-            self.recorder.kernel(&label, &operation.text(), &bindings, &[("work_group_size", GROUP.into())])
-        }));
+        let kernel = Rc::clone(
+            self.operations
+                .borrow_mut()
+                .entry(operation)
+                .or_insert_with(|| self.kernel(&format!("{operation:?}"), &operation.text(), &operation.arguments())),
+        );
         let groups = match operation {
             // One group adds up all partial sums.
             Operation::Sum => [1, 1],
@@ -349,11 +356,8 @@ impl Backend for GpuBackend {
 
     fn update<U: Update>(&self, registers: &mut GpuRegisters) {
         let kernel = Rc::clone(self.updates.borrow_mut().entry(TypeId::of::<U>()).or_insert_with(|| {
-            let accesses = update_arguments(U::SUMS).into_iter().map(|(_, _, access)| access);
-            let bindings: Vec<Access> = std::iter::once(Access::Uniform).chain(accesses).collect();
             let text = update_text(U::SUMS, &trace::statements::<U>());
-            let label = std::any::type_name::<U>();
-            self.recorder.kernel(label, &text, &bindings, &[("work_group_size", GROUP.into())])
+            self.kernel(std::any::type_name::<U>(), &text, &update_arguments(U::SUMS))
         }));
         let numbers = [self.pending.get(), 0, 0, 0];
         if U::SUMS {

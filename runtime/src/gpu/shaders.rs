@@ -84,7 +84,7 @@ pub(super) enum Access {
 use Access::{Read, Write};
 
 /// A storage buffer of an operation: name, element type, access.
-type Argument = (&'static str, &'static str, Access);
+pub(super) type Argument = (&'static str, &'static str, Access);
 
 const fn vector(name: &'static str, access: Access) -> Argument {
     (name, "vec4<f32>", access)
