@@ -6,19 +6,22 @@
 use std::sync::LazyLock;
 
 use tensormass_kernels::{LawEntry, laws};
-use tensormass_testing::codegen::derivation::Derivation;
+use tensormass_testing::codegen::derivation::{Derivation, PointKernel};
 use tensormass_testing::codegen::element::{kernels, tetrahedron_p1};
-use tensormass_testing::codegen::ir::{Builder, Input, Number, Op, Output, Rational, ValidKernel, ValueId};
+use tensormass_testing::codegen::ir::{Builder, Input, Number, Op, Output, Rational, Remainder, ValidKernel, ValueId};
 use tensormass_testing::codegen::print::wgsl;
 use tensormass_testing::derivation;
 use tensormass_testing::evaluate::{Functions, Value};
 use tensormass_testing::random::Rng;
+use tensormass_testing::rounding::printed;
 
 const STATES: u64 = 30;
 
 /// Every helper function, as a text.
 static HELPERS: LazyLock<Functions> = LazyLock::new(|| {
-    let all = kernel(|b, [x, y, z]| [Op::Log1p(x), Op::Expm1(y), Op::Powf(x, z)].map(|op| b.push(op)).to_vec());
+    let all = kernel(|b, [x, y, z]| {
+        [Op::Log1p(x), Op::Expm1(y), Op::Powf(x, z), Op::Log1pmx(x), Op::Expm1mx(y)].map(|op| b.push(op)).to_vec()
+    });
     Functions::parse(&wgsl::function(&all))
 });
 
@@ -69,6 +72,12 @@ impl Number for OnDevice {
     fn expm1(&self) -> Self {
         Self(helper("expm1_", &[self.0]))
     }
+    fn log1pmx(&self) -> Self {
+        Self(helper("log1pmx_", &[self.0]))
+    }
+    fn expm1mx(&self) -> Self {
+        Self(helper("expm1mx_", &[self.0]))
+    }
     fn powf(&self, b: &Self) -> Self {
         Self(helper("powf_", &[self.0, b.0]))
     }
@@ -78,15 +87,15 @@ impl Number for OnDevice {
 }
 
 /// Compares one function of a text with the kernel that it was printed from, bit for bit.
-fn check(what: &str, functions: &Functions, kernel: &ValidKernel, inputs: &[(Input, Vec<f32>)]) {
+fn check(what: &str, functions: &Functions, kernel: PointKernel<'_>, inputs: &[(Input, Vec<f32>)]) {
     let of = |role: Input| &inputs.iter().find(|(r, _)| *r == role).expect("an input of each role").1;
-    let declared = kernel.ir().inputs.iter().map(|&(role, _)| role);
+    let declared = kernel.near.ir().inputs.iter().map(|&(role, _)| role);
     let read: Vec<Value> = declared
         .clone()
         .filter(|role| kernel.reads(*role))
         .map(|role| if role == Input::Weight { Value::F32(of(role)[0]) } else { Value::array(of(role)) })
         .collect();
-    let actual = functions.call(&kernel.ir().name, &read).numbers();
+    let actual = functions.call(kernel.name(), &read).numbers();
     let wrapped: Vec<(Input, Vec<OnDevice>)> =
         declared.map(|role| (role, of(role).iter().copied().map(OnDevice).collect())).collect();
     let wrapped: Vec<(Input, &[OnDevice])> = wrapped.iter().map(|(role, values)| (*role, values.as_slice())).collect();
@@ -104,7 +113,11 @@ fn check_law(law: &LawEntry, ir: &Derivation, seed: u64) {
     let single = |values: &[f64]| values.iter().map(|&x| x as f32).collect::<Vec<f32>>();
     let inputs = [
         (Input::Constants, constants),
-        (Input::DisplacementGradient, single(&rng.gradient(0.5, 2.0))),
+        // Near rest, and far from it.
+        (
+            Input::DisplacementGradient,
+            single(&if seed % 3 == 0 { rng.gradient(0.1, 10.0) } else { rng.gradient(0.5, 2.0) }),
+        ),
         (Input::GradientIncrement, single(&rng.direction())),
         (Input::NodeGradient, single(&rng.direction()[..3])),
     ];
@@ -113,7 +126,7 @@ fn check_law(law: &LawEntry, ir: &Derivation, seed: u64) {
         [("energy", s.energy), ("force", s.force), ("dforce", s.dforce), ("diagonal", s.diagonal), ("cauchy", s.cauchy)]
     {
         let what = format!("{}, {name}, seed {seed}", law.info.name);
-        check(&what, &Functions::parse(shader.text), ir.kernel(name), &inputs);
+        check(&what, &Functions::parse(shader.text), ir.point(name), &inputs);
     }
 }
 
@@ -144,7 +157,8 @@ fn functions_of_the_element() {
             ];
             for (found, (kernel, inputs)) in found.iter_mut().zip(&cases) {
                 if functions.has(&kernel.ir().name) {
-                    check(&format!("{}, {}", law.info.name, kernel.ir().name), &functions, kernel, inputs);
+                    let kernel = PointKernel { near: kernel, far: None };
+                    check(&format!("{}, {}", law.info.name, kernel.name()), &functions, kernel, inputs);
                     *found += 1;
                 }
             }
@@ -173,12 +187,18 @@ fn every_operation() {
     });
     let functions = kernel(|b, [x, y, z]| {
         let ops = [Op::Sqrt(x), Op::Ln(y), Op::Exp(z), Op::Log1p(x), Op::Expm1(y), Op::Powf(x, z)];
-        ops.into_iter().map(|op| b.push(op)).collect()
+        let ops = ops.into_iter().chain([Op::Log1pmx(z), Op::Expm1mx(x)]);
+        ops.map(|op| b.push(op)).collect()
     });
     for kernel in [exact, functions] {
         let text = Functions::parse(&wgsl::function(&kernel));
         for values in [[1.7, 0.4, 2.3], [0.1, 3.0, -0.7]] {
-            check("every operation", &text, &kernel, &[(Input::Constants, values.to_vec())]);
+            check(
+                "every operation",
+                &text,
+                PointKernel { near: &kernel, far: None },
+                &[(Input::Constants, values.to_vec())],
+            );
         }
     }
 }
@@ -248,8 +268,22 @@ fn own_functions_are_as_accurate_as_stated() {
             |x| x[0].powf(x[1]),
             |x| 3.0 + 5.0 * (x[1] * x[0].ln()).abs(),
         ),
+        worst(
+            "log1pmx_",
+            octaves(1e-15, 1e30, N).chain(octaves(-1e-15, -0.9999, N)).chain(evenly(-0.6, 1.1, N)).map(one),
+            |x| Remainder::log1pmx(x[0]),
+            |_| printed::LOG1PMX,
+        ),
+        worst(
+            "expm1mx_",
+            octaves(1e-15, 80.0, N).chain(octaves(-1e-15, -80.0, N)).chain(evenly(-1.1, 1.1, N)).map(one),
+            |x| Remainder::expm1mx(x[0]),
+            |_| printed::EXPM1MX,
+        ),
     ];
-    eprintln!("greatest errors of ln, log1p, exp, expm1, powf as shares of what they state: {found:.2?}");
+    eprintln!(
+        "greatest errors of ln, log1p, exp, expm1, powf, log1pmx, expm1mx as shares of what they state: {found:.2?}"
+    );
     // Outside: saturation, not infinity.
     let exp = |x: f32| helper("exp_", &[x]);
     assert_eq!(exp(-1e30), 0.0);

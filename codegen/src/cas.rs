@@ -35,19 +35,23 @@ impl Cas {
         self.symbols[s.0 as usize]
     }
 
-    fn atom(&mut self, e: &Expr) -> Atom {
-        match e {
+    fn atom(&mut self, e: &Expr) -> Result<Atom, UnexpectedTerm> {
+        Ok(match e {
             Expr::Number(q) => number(*q),
             Expr::Symbol(s) => Atom::var(self.symbol(*s)),
-            Expr::Sum(xs) => xs.iter().fold(Atom::num(0), |sum, x| sum + self.atom(x)),
-            Expr::Product(xs) => xs.iter().fold(Atom::num(1), |product, x| product * self.atom(x)),
+            Expr::Sum(xs) => xs.iter().try_fold(Atom::num(0), |sum, x| Ok(sum + self.atom(x)?))?,
+            Expr::Product(xs) => xs.iter().try_fold(Atom::num(1), |product, x| Ok(product * self.atom(x)?))?,
             Expr::Power(a, b) => {
-                let (a, b) = (self.atom(a), self.atom(b));
+                let (a, b) = (self.atom(a)?, self.atom(b)?);
                 a.pow(b)
             }
-            Expr::Ln(a) => self.atom(a).log(),
-            Expr::Exp(a) => self.atom(a).exp(),
-        }
+            Expr::Ln(a) => self.atom(a)?.log(),
+            Expr::Exp(a) => self.atom(a)?.exp(),
+            // What the splitting writes is not differentiated any more.
+            Expr::Log1p(_) | Expr::Expm1(_) | Expr::Log1pmx(_) | Expr::Expm1mx(_) => {
+                return Err(UnexpectedTerm("log1p, expm1 or a remainder".into()));
+            }
+        })
     }
 
     fn expr(&self, view: AtomView) -> Result<Expr, UnexpectedTerm> {
@@ -97,7 +101,7 @@ impl Cas {
     /// # Errors
     /// The system answered in terms that have no meaning here.
     pub fn normalize(&mut self, e: &Expr) -> Result<Expr, UnexpectedTerm> {
-        let atom = self.atom(e);
+        let atom = self.atom(e)?;
         self.expr(atom.as_view())
     }
 
@@ -106,7 +110,16 @@ impl Cas {
     /// # Errors
     /// The system answered in terms that have no meaning here.
     pub fn expand(&mut self, e: &Expr) -> Result<Expr, UnexpectedTerm> {
-        let atom = self.atom(e).expand();
+        let atom = self.atom(e)?.expand();
+        self.expr(atom.as_view())
+    }
+
+    /// The expression over a common denominator, which is 0 only where the expression is.
+    ///
+    /// # Errors
+    /// The system answered in terms that have no meaning here.
+    pub fn together(&mut self, e: &Expr) -> Result<Expr, UnexpectedTerm> {
+        let atom = self.atom(e)?.together();
         self.expr(atom.as_view())
     }
 
@@ -115,7 +128,7 @@ impl Cas {
     /// # Errors
     /// The system answered in terms that have no meaning here.
     pub fn derivative(&mut self, e: &Expr, by: Symbol) -> Result<Expr, UnexpectedTerm> {
-        let atom = self.atom(e).derivative(self.symbol(by));
+        let atom = self.atom(e)?.derivative(self.symbol(by));
         self.expr(atom.as_view())
     }
 }

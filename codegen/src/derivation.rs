@@ -1,11 +1,24 @@
 //! The derivation of one law: its kernels, validated, and the text form that `laws/derived/` commits.
 
-use crate::ir::{InvalidKernel, IrTextError, KernelIr, ValidKernel};
+use crate::ir::{Input, InterpretError, InvalidKernel, IrTextError, KernelIr, Number, Output, ValidKernel, ValueId};
 
 /// The version of the derivation's text form.
-const FORMAT: &str = "tensormass derivation 1";
+const FORMAT: &str = "tensormass derivation 2";
 
-/// The kernels of one law, in the order material, energy, force, dforce, diagonal, cauchy.
+/// A term that was rewritten so that it does not cancel at rest.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Rewrite {
+    /// The kernel for which it was rewritten.
+    pub kernel: String,
+    /// The term as the law file has it.
+    pub term: String,
+    /// Its exact constant at rest.
+    pub rest: String,
+    /// What is computed instead, without the constant (and, in energies, without the part that is linear in the strain).
+    pub form: String,
+}
+
+/// The kernels of one law, in the order of [`KERNELS`], each followed by its sibling for far from rest if it has one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Derivation {
     /// The law's name.
@@ -14,8 +27,59 @@ pub struct Derivation {
     pub hash: u64,
     /// The material's constants, as expressions in the parameters for the reader.
     pub constants: Vec<String>,
+    /// W at rest, as an expression in the parameters: energies count from there.
+    pub energy_at_rest: String,
+    /// What was rewritten for the sake of accuracy at rest.
+    pub rewrites: Vec<Rewrite>,
     /// The kernels.
     pub kernels: Vec<ValidKernel>,
+}
+
+/// A kernel at a material point: one form, or one near rest and one for elsewhere.
+#[derive(Debug, Clone, Copy)]
+pub struct PointKernel<'a> {
+    /// The form that counts where its output [`Output::NearRest`] is positive, or everywhere if it has none.
+    pub near: &'a ValidKernel,
+    /// The textbook form for elsewhere.
+    pub far: Option<&'a ValidKernel>,
+}
+
+impl PointKernel<'_> {
+    /// The kernel's name.
+    pub fn name(&self) -> &str {
+        &self.near.ir().name
+    }
+
+    /// The outputs that count, in order: those of [`PointKernel::near`] but [`Output::NearRest`].
+    pub fn outputs(&self) -> impl Iterator<Item = &(Output, Vec<ValueId>)> {
+        self.near.ir().outputs.iter().filter(|(role, _)| *role != Output::NearRest)
+    }
+
+    /// Whether a form reads the input with this role.
+    pub fn reads(&self, role: Input) -> bool {
+        self.near.reads(role) || self.far.is_some_and(|k| k.reads(role))
+    }
+
+    /// Evaluates the form that counts: the arrays of [`PointKernel::outputs`].
+    ///
+    /// # Errors
+    /// An input array is missing or has the wrong length.
+    pub fn interpret<T: Number>(&self, inputs: &[(Input, &[T])]) -> Result<Vec<Vec<T>>, InterpretError> {
+        let mut near = self.near.interpret(inputs)?;
+        match (self.far, self.near.ir().outputs.iter().position(|(role, _)| *role == Output::NearRest)) {
+            (Some(far), Some(k)) => {
+                let margin = near.remove(k).remove(0);
+                let zero = T::from_rational(0.into());
+                if margin.greater(&zero) { Ok(near) } else { far.interpret(inputs) }
+            }
+            _ => Ok(near),
+        }
+    }
+
+    /// The form without any rewriting: what the law file says, whatever cancels.
+    pub fn textbook(&self) -> &ValidKernel {
+        self.far.unwrap_or(self.near)
+    }
 }
 
 /// Why a derivation's text is refused.
@@ -37,14 +101,22 @@ pub enum DerivationError {
     },
 }
 
+/// The ending of the name of a kernel's form for far from rest.
+pub const FAR: &str = "_far";
+
 /// The kernels of every law, in order.
 pub const KERNELS: [&str; 6] = ["material", "energy", "force", "dforce", "diagonal", "cauchy"];
 
 impl Derivation {
     /// The kernel of this name.
     pub fn kernel(&self, name: &str) -> &ValidKernel {
-        let i = KERNELS.iter().position(|k| *k == name).expect("one of KERNELS");
-        &self.kernels[i]
+        self.kernels.iter().find(|k| k.ir().name == name).expect("one of KERNELS")
+    }
+
+    /// A kernel at a material point, with its form for far from rest.
+    pub fn point(&self, name: &str) -> PointKernel<'_> {
+        let far = self.kernels.iter().find(|k| k.ir().name.strip_suffix(FAR) == Some(name));
+        PointKernel { near: self.kernel(name), far }
     }
 
     /// The derivation as text: deterministic, line by line reviewable.
@@ -58,6 +130,10 @@ impl Derivation {
         out += &format!("law {}\nhash {:016x}\n", self.law, self.hash);
         for (k, c) in self.constants.iter().enumerate() {
             out += &format!("constant {k} = {c}\n");
+        }
+        out += &format!("energy_at_rest = {}\n", self.energy_at_rest);
+        for r in &self.rewrites {
+            out += &format!("rewrite {} | {} | {} | {}\n", r.kernel, r.term, r.rest, r.form);
         }
         for kernel in &self.kernels {
             out.push('\n');
@@ -93,15 +169,29 @@ impl Derivation {
         while let Some((_, l)) = lines.next_if(|(_, l)| l.starts_with("constant ")) {
             constants.push(l.split_once('=').map_or("", |(_, c)| c).trim().to_string());
         }
+        let energy_at_rest = match lines.next_if(|(_, l)| l.starts_with("energy_at_rest")) {
+            Some((_, l)) => l.split_once('=').map_or("", |(_, e)| e).trim().to_string(),
+            None => return Err(error(1, "`energy_at_rest = ...` is missing").into()),
+        };
+        let mut rewrites = Vec::new();
+        while let Some((line, l)) = lines.next_if(|(_, l)| l.starts_with("rewrite ")) {
+            let parts: Vec<String> = l["rewrite ".len()..].split(" | ").map(|p| p.trim().to_string()).collect();
+            let [kernel, term, rest, form]: [String; 4] =
+                parts.try_into().map_err(|_| error(line, "expected `rewrite KERNEL | TERM | REST | FORM`"))?;
+            rewrites.push(Rewrite { kernel, term, rest, form });
+        }
         let mut kernels = Vec::new();
         while lines.peek().is_some() {
             kernels.push(KernelIr::from_lines(&mut lines)?.validate()?);
         }
-        let found: Vec<&str> = kernels.iter().map(|k| k.ir().name.as_str()).collect();
-        if found != KERNELS {
+        let found: Vec<&str> = kernels.iter().map(|k: &ValidKernel| k.ir().name.as_str()).collect();
+        // A sibling follows its kernel.
+        let is_sibling = |k: usize| k > 0 && found[k].strip_suffix(FAR) == Some(found[k - 1]);
+        let base: Vec<&str> = (0..found.len()).filter(|&k| !is_sibling(k)).map(|k| found[k]).collect();
+        if base != KERNELS {
             return Err(DerivationError::Kernels { expected: KERNELS.join(", "), found: found.join(", ") });
         }
-        Ok(Self { law, hash, constants, kernels })
+        Ok(Self { law, hash, constants, energy_at_rest, rewrites, kernels })
     }
 }
 

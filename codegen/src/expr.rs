@@ -25,6 +25,14 @@ pub enum Expr {
     Ln(Box<Expr>),
     /// Exponential.
     Exp(Box<Expr>),
+    /// ln(1 + x).
+    Log1p(Box<Expr>),
+    /// exp(x) - 1.
+    Expm1(Box<Expr>),
+    /// x - ln(1 + x).
+    Log1pmx(Box<Expr>),
+    /// exp(x) - 1 - x.
+    Expm1mx(Box<Expr>),
 }
 
 impl Expr {
@@ -64,6 +72,7 @@ impl Expr {
                 b.for_each_symbol(f);
             }
             Expr::Ln(a) | Expr::Exp(a) => a.for_each_symbol(f),
+            Expr::Log1p(a) | Expr::Expm1(a) | Expr::Log1pmx(a) | Expr::Expm1mx(a) => a.for_each_symbol(f),
         }
     }
 

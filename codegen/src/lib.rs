@@ -29,6 +29,9 @@ pub mod oracle;
 pub mod print;
 #[cfg(feature = "derive")]
 mod quantity;
+mod remainder;
+#[cfg(feature = "derive")]
+mod split;
 pub mod structure;
 pub mod worker;
 

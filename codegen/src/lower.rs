@@ -99,12 +99,26 @@ pub struct Lowering<'a, N: FnMut(&Expr) -> Expr> {
     normalize: N,
     builder: Builder,
     lowered: HashMap<Symbol, Scaled>,
+    /// Quantities in whose place others are computed, which are equal.
+    instead: HashMap<Symbol, Symbol>,
 }
 
 impl<'a, N: FnMut(&Expr) -> Expr> Lowering<'a, N> {
     /// A kernel over these quantities. `constants` is `None` for the kernel that computes the constants.
     pub fn new(quantities: &'a Quantities, constants: Option<&'a mut Constants>, normalize: N) -> Self {
-        Self { quantities, constants, normalize, builder: Builder::new(), lowered: HashMap::new() }
+        Self {
+            quantities,
+            constants,
+            normalize,
+            builder: Builder::new(),
+            lowered: HashMap::new(),
+            instead: HashMap::new(),
+        }
+    }
+
+    /// Computes `other` wherever `s` is read.
+    pub fn compute_instead(&mut self, s: Symbol, other: Symbol) {
+        self.instead.insert(s, other);
     }
 
     /// The value of an expression.
@@ -125,6 +139,12 @@ impl<'a, N: FnMut(&Expr) -> Expr> Lowering<'a, N> {
     fn symbol(&mut self, s: Symbol) -> Scaled {
         if let Some(scaled) = self.lowered.get(&s) {
             return scaled.clone();
+        }
+        if let Some(other) = self.instead.remove(&s) {
+            // Once: what is computed instead may itself fall back on `s`.
+            let scaled = self.symbol(other);
+            self.lowered.insert(s, scaled.clone());
+            return scaled;
         }
         let quantities = self.quantities;
         let quantity = quantities.get(s);
@@ -201,9 +221,16 @@ impl<'a, N: FnMut(&Expr) -> Expr> Lowering<'a, N> {
                 let value = self.builder.push(Op::Powf(base, exponent));
                 *m.powers.entry(value).or_insert_with(Rational::zero) += r;
             }
-            (Expr::Ln(a), _) | (Expr::Exp(a), _) => {
+            (Expr::Ln(a) | Expr::Exp(a) | Expr::Log1p(a) | Expr::Expm1(a) | Expr::Log1pmx(a) | Expr::Expm1mx(a), _) => {
                 let a = self.value(a);
-                let value = self.builder.push(if matches!(e, Expr::Ln(_)) { Op::Ln(a) } else { Op::Exp(a) });
+                let value = self.builder.push(match e {
+                    Expr::Ln(_) => Op::Ln(a),
+                    Expr::Exp(_) => Op::Exp(a),
+                    Expr::Log1p(_) => Op::Log1p(a),
+                    Expr::Expm1(_) => Op::Expm1(a),
+                    Expr::Log1pmx(_) => Op::Log1pmx(a),
+                    _ => Op::Expm1mx(a),
+                });
                 *m.powers.entry(value).or_insert_with(Rational::zero) += r;
             }
             (Expr::Number(_) | Expr::Symbol(_) | Expr::Sum(_) | Expr::Product(_), _) => {
@@ -400,22 +427,19 @@ impl<'a, N: FnMut(&Expr) -> Expr> Lowering<'a, N> {
         Scaled { coefficient: sign, value: Some(value) }
     }
 
-    /// The sum of values with signs (`true` is minus); the result's own sign is returned where all are negative.
+    /// The sum of values with signs (`true` is minus); the result's own sign is returned where it was left out. Halves
+    /// are added first: fewer roundings lie on top of each other, and a processor can add them at once.
     fn signed_sum(&mut self, summands: &[(ValueId, bool)]) -> (ValueId, bool) {
-        let first = summands.iter().position(|&(_, negative)| !negative);
-        let all_negative = first.is_none();
-        let first = first.unwrap_or(0);
-        let mut total = summands[first].0;
-        for (i, &(value, negative)) in summands.iter().enumerate() {
-            if i != first {
-                total = if negative == all_negative {
-                    self.builder.add(total, value)
-                } else {
-                    self.builder.sub(total, value)
-                };
-            }
+        if let [single] = summands {
+            return *single;
         }
-        (total, all_negative)
+        let (left, right) = summands.split_at(summands.len().div_ceil(2));
+        let ((a, minus_a), (b, minus_b)) = (self.signed_sum(left), self.signed_sum(right));
+        match (minus_a, minus_b) {
+            (false, true) => (self.builder.sub(a, b), false),
+            (true, false) => (self.builder.sub(b, a), false),
+            _ => (self.builder.add(a, b), minus_a),
+        }
     }
 }
 

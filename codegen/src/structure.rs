@@ -23,7 +23,7 @@ pub fn detect(derivation: &Derivation) -> Structure {
         k.ir().values.iter().all(|d| match d.op {
             Op::Input(..) | Op::Const(_) | Op::Add(..) | Op::Sub(..) | Op::Mul(..) | Op::Neg(_) | Op::Fma(..) => true,
             Op::Div(..) | Op::Sqrt(_) | Op::Ln(_) | Op::Exp(_) | Op::Log1p(_) | Op::Expm1(_) => false,
-            Op::Powf(..) | Op::Select(..) => false,
+            Op::Log1pmx(_) | Op::Expm1mx(_) | Op::Powf(..) | Op::Select(..) => false,
         })
     });
     Structure { linear, uses_j, polynomial }

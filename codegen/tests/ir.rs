@@ -71,6 +71,8 @@ v11 = log1p v0
 v12 = expm1 v0
 v13 = powf v0 v1
 v14 = select v0 v1 v2 v3
+v15 = log1pmx v0
+v16 = expm1mx v0
 out constants v2
 out energy_density v2
 out stress v2
@@ -78,6 +80,7 @@ out stress_increment v2
 out diagonal v2
 out cauchy v2
 out domain_margin v2
+out near_rest v2
 out displacement_gradient v2
 out nodal_force v2
 out node_gradients v2
@@ -156,6 +159,10 @@ fn operations_mean_what_the_table_says() {
     // ln(1 + 1e-20) and exp(1e-20) - 1 are 1e-20, not 0.
     assert_eq!(run(Op::Log1p(a), [1e-20, 0.0, 0.0, 0.0]), 1e-20);
     assert_eq!(run(Op::Expm1(a), [1e-20, 0.0, 0.0, 0.0]), 1e-20);
+    // Their remainders begin with x^2 / 2.
+    let half_square = 0.5 * 1e-20 * 1e-20;
+    assert_eq!(run(Op::Log1pmx(a), [1e-20, 0.0, 0.0, 0.0]), half_square);
+    assert_eq!(run(Op::Expm1mx(a), [1e-20, 0.0, 0.0, 0.0]), half_square);
     let select = Op::Select(a, b, c, d);
     assert_eq!(run(select, [2.0, 1.0, 3.0, 4.0]), 3.0);
     assert_eq!(run(select, [1.0, 1.0, 3.0, 4.0]), 4.0, "equal is not greater");

@@ -1,5 +1,6 @@
 //! The number types that kernels run on.
 
+use remainder::Remainder;
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -34,12 +35,21 @@ pub trait Real:
     fn ln_1p(self) -> Self;
     /// exp(x) - 1, accurate for small x.
     fn exp_m1(self) -> Self;
+    /// x - ln(1 + x), accurate for small x.
+    fn log1pmx(self) -> Self;
+    /// exp(x) - 1 - x, accurate for small x.
+    fn expm1mx(self) -> Self;
     /// x to the power y, for x > 0.
     fn powf(self, y: Self) -> Self;
     /// `then` where left > right, `otherwise` elsewhere, lane by lane.
     fn select_greater(left: Self, right: Self, then: Self, otherwise: Self) -> Self;
     /// Whether every lane is > 0. NaN is not.
     fn is_positive(self) -> bool;
+}
+
+/// The text that the interpreter of kernels uses too: the same operations, bit for bit.
+mod remainder {
+    include!(concat!(env!("OUT_DIR"), "/remainder.rs"));
 }
 
 macro_rules! float {
@@ -76,6 +86,14 @@ macro_rules! float {
             #[inline(always)]
             fn exp_m1(self) -> Self {
                 <$t>::exp_m1(self)
+            }
+            #[inline(always)]
+            fn log1pmx(self) -> Self {
+                Remainder::log1pmx(self)
+            }
+            #[inline(always)]
+            fn expm1mx(self) -> Self {
+                Remainder::expm1mx(self)
             }
             #[inline(always)]
             fn powf(self, y: Self) -> Self {

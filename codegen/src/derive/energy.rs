@@ -32,6 +32,8 @@ pub struct Energy<'a> {
     /// The symbols of the parameters' components, parameter by parameter.
     parameters: Vec<Vec<Symbol>>,
     known: HashMap<*const ScalarNode, Expr>,
+    /// The tensor in which finite strains are expressed.
+    finite: Base,
 }
 
 impl<'a> Energy<'a> {
@@ -48,7 +50,20 @@ impl<'a> Energy<'a> {
             }
             parameters.push(components);
         }
-        Self { cas, quantities, strain, parameters, known: HashMap::new() }
+        Self { cas, quantities, strain, parameters, known: HashMap::new(), finite: Base::A }
+    }
+
+    /// The declared ranges, by the parameters' symbols.
+    pub fn ranges(&self, law: &Law) -> HashMap<Symbol, (f64, f64)> {
+        let each = self.parameters.iter().zip(&law.parameters);
+        each.flat_map(|(symbols, p)| symbols.iter().map(|&s| (s, p.range))).collect()
+    }
+
+    /// From here on finite strains are expressed in C itself instead of A = C - I: the textbook form, which keeps its
+    /// digits where a body is compressed to almost nothing.
+    pub fn far_from_rest(&mut self) {
+        self.finite = Base::C;
+        self.known.retain(|_, e| self.quantities.is_constant_expr(e));
     }
 
     /// The expression of a scalar.
@@ -143,6 +158,10 @@ impl<'a> Energy<'a> {
         let single = |base, factor| Combination { bases: vec![(base, factor)], identity: Expr::int(0) };
         Ok(match &**t {
             TensorNode::Eps => single(Base::Eps, Expr::int(1)),
+            TensorNode::E if self.finite == Base::C => {
+                Combination { identity: Expr::ratio(-1, 2), ..single(Base::C, Expr::ratio(1, 2)) }
+            }
+            TensorNode::C if self.finite == Base::C => single(Base::C, Expr::int(1)),
             TensorNode::E => single(Base::A, Expr::ratio(1, 2)),
             TensorNode::C => Combination { identity: Expr::int(1), ..single(Base::A, Expr::int(1)) },
             TensorNode::Identity => Combination { bases: vec![], identity: Expr::int(1) },
@@ -239,5 +258,6 @@ fn nodes(e: &Expr) -> usize {
         Expr::Sum(xs) | Expr::Product(xs) => 1 + xs.iter().map(nodes).sum::<usize>(),
         Expr::Power(a, b) => 1 + nodes(a) + nodes(b),
         Expr::Ln(a) | Expr::Exp(a) => 1 + nodes(a),
+        Expr::Log1p(a) | Expr::Expm1(a) | Expr::Log1pmx(a) | Expr::Expm1mx(a) => 1 + nodes(a),
     }
 }

@@ -7,6 +7,7 @@
 
 mod differential;
 mod energy;
+mod rest;
 mod strain;
 
 use std::collections::BTreeMap;
@@ -18,6 +19,7 @@ use crate::ir::{Input, InvalidKernel, KernelIr, Output, Rational};
 use crate::law::ast::Law;
 use crate::lower::{Constants, Lowering};
 use crate::quantity::{Kind, Quantities, Value};
+use crate::split::{Rest, SplitError};
 
 use differential::Differential;
 use energy::Energy;
@@ -32,6 +34,9 @@ pub enum DeriveError {
     /// The generated kernel breaks a rule of the language: a defect of the generator.
     #[error("the generator made a kernel that it refuses itself (please report this): {0}")]
     Invalid(#[from] InvalidKernel),
+    /// The law cannot be split at rest.
+    #[error(transparent)]
+    Split(#[from] SplitError),
     /// The law uses something that this version cannot differentiate.
     #[error("{0}")]
     Unsupported(String),
@@ -52,6 +57,9 @@ struct Session {
     strain: Strain,
     energy: Expr,
     margin: Option<Expr>,
+    rest: Rest,
+    /// The energy in C instead of C - I.
+    far_energy: Expr,
 }
 
 impl Session {
@@ -64,12 +72,26 @@ impl Session {
         let margin = match &law.domain {
             Some(domain) => {
                 let (left, right) = (reader.scalar(&domain.left)?, reader.scalar(&domain.right)?);
-                Some(cas.normalize(&(left - right))?)
+                Some(left - right)
             }
             None => None,
         };
+        let ranges = reader.ranges(law);
+        reader.far_from_rest();
+        let far_energy = reader.scalar(&law.energy)?;
+        let far_energy = cas.normalize(&far_energy)?;
+        let margin = margin.map(|m| cas.normalize(&m)).transpose()?;
         let energy = cas.normalize(&energy)?;
-        Ok(Self { cas, quantities, constants: Constants::default(), strain, energy, margin })
+        Ok(Self {
+            cas,
+            quantities,
+            constants: Constants::default(),
+            strain,
+            energy,
+            margin,
+            rest: Rest::new(ranges),
+            far_energy,
+        })
     }
 
     fn derivation(mut self, law: &Law) -> Result<Derivation, DeriveError> {
@@ -81,20 +103,53 @@ impl Session {
         let node = vector(&mut self.quantities, "g", NodeGradient, 3);
         let diagonal = self.diagonal(&stress, &node)?;
         let cauchy = self.cauchy(&stress);
+        let (near_energy, at_rest) = self.near_energy()?;
+        let near_stress = self.near_stress(&stress)?;
+        let from_rest = |e: Expr| if at_rest.is_zero() { e } else { e - at_rest.clone() };
+        let (energy, far_energy) = (from_rest(energy), from_rest(self.far_energy.clone()));
 
-        let with_margin = |role: Output, outputs: Vec<Expr>| {
+        use Input::{DisplacementGradient as G, GradientIncrement, NodeGradient};
+        let mut point = Vec::new();
+        let with_margin = |role, outputs: Vec<Expr>, margin: &Option<Expr>| {
             let mut all = vec![(role, outputs)];
             all.extend(margin.iter().map(|m| (Output::DomainMargin, vec![m.clone()])));
             all
         };
-        use Input::{DisplacementGradient as G, GradientIncrement, NodeGradient};
-        let point = vec![
-            self.lower("energy", &[G], with_margin(Output::EnergyDensity, vec![energy])),
-            self.lower("force", &[G], with_margin(Output::Stress, stress.to_vec())),
-            self.lower("dforce", &[G, GradientIncrement], vec![(Output::StressIncrement, increment)]),
-            self.lower("diagonal", &[G, NodeGradient], vec![(Output::Diagonal, diagonal)]),
-            self.lower("cauchy", &[G], vec![(Output::Cauchy, cauchy)]),
-        ];
+        match near_energy {
+            Some(near) => {
+                let mut outputs = with_margin(Output::EnergyDensity, vec![near.value], &margin);
+                outputs.push((Output::NearRest, vec![near.holds]));
+                point.push(self.lower("energy", &[G], outputs));
+                point.push(self.lower(
+                    "energy_far",
+                    &[G],
+                    with_margin(Output::EnergyDensity, vec![far_energy], &margin),
+                ));
+            }
+            None => point.push(self.lower("energy", &[G], with_margin(Output::EnergyDensity, vec![energy], &margin))),
+        }
+        let far_margin = margin.clone();
+        match &near_stress {
+            Some(near) => {
+                let mut outputs = with_margin(Output::Stress, near.stress.to_vec(), &near.margin);
+                outputs.push((Output::NearRest, vec![near.holds.clone()]));
+                point.push(self.lower("force", &[G], outputs));
+                point.push(self.lower("force_far", &[G], with_margin(Output::Stress, stress.to_vec(), &far_margin)));
+            }
+            None => point.push(self.lower("force", &[G], with_margin(Output::Stress, stress.to_vec(), &margin))),
+        }
+        let accurate = self.accurate_jacobian()?;
+        let outputs = vec![(Output::StressIncrement, increment)];
+        point.push(self.lower_with("dforce", &[G, GradientIncrement], outputs, accurate));
+        point.push(self.lower_with("diagonal", &[G, NodeGradient], vec![(Output::Diagonal, diagonal)], accurate));
+        match near_stress {
+            Some(near) => {
+                let outputs = vec![(Output::Cauchy, near.cauchy), (Output::NearRest, vec![near.holds])];
+                point.push(self.lower("cauchy", &[G], outputs));
+                point.push(self.lower("cauchy_far", &[G], vec![(Output::Cauchy, cauchy)]));
+            }
+            None => point.push(self.lower("cauchy", &[G], vec![(Output::Cauchy, cauchy)])),
+        }
         let parameters: u32 = law.parameters.iter().map(|p| p.len as u32).sum();
         let (material, names) = self.material(parameters)?;
         let count = self.constants.expressions().len() as u32;
@@ -103,14 +158,35 @@ impl Session {
             kernel.inputs.insert(0, (Input::Constants, count));
             kernels.push(kernel.validate()?);
         }
-        Ok(Derivation { law: law.name.clone(), hash: crate::derivation::hash(&law.text), constants: names, kernels })
+        Ok(Derivation {
+            law: law.name.clone(),
+            hash: crate::derivation::hash(&law.text),
+            constants: names,
+            energy_at_rest: crate::print::expression(&at_rest, &self.quantities),
+            rewrites: self.rest.rewrites,
+            kernels,
+        })
     }
 
     fn lower(&mut self, name: &str, inputs: &[Input], outputs: Vec<(Output, Vec<Expr>)>) -> KernelIr {
+        self.lower_with(name, inputs, outputs, None)
+    }
+
+    /// As `lower`, computing the second quantity of `instead` for the first.
+    fn lower_with(
+        &mut self,
+        name: &str,
+        inputs: &[Input],
+        outputs: Vec<(Output, Vec<Expr>)>,
+        instead: Option<(Symbol, Symbol)>,
+    ) -> KernelIr {
         let cas = &mut self.cas;
         // A normalisation that the system cannot express leaves the expression as it stands: still right.
         let normalize = |e: &Expr| cas.normalize(e).unwrap_or_else(|_| e.clone());
         let mut lowering = Lowering::new(&self.quantities, Some(&mut self.constants), normalize);
+        if let Some((s, other)) = instead {
+            lowering.compute_instead(s, other);
+        }
         let outputs =
             outputs.into_iter().map(|(role, es)| (role, es.iter().map(|e| lowering.value(e)).collect())).collect();
         let length = |role: Input| if role == Input::NodeGradient { 3 } else { 9 };
@@ -226,14 +302,18 @@ impl Session {
     /// sigma = P F' / J.
     fn cauchy(&mut self, stress: &[Expr; 9]) -> Vec<Expr> {
         let j = self.strain.jacobian(&mut self.cas, &mut self.quantities);
-        let f = self.strain.deformation().to_vec();
+        let f = self.strain.deformation().map(Expr::from);
+        self.cauchy_of(stress, &j.into(), &f)
+    }
+
+    fn cauchy_of(&mut self, stress: &[Expr; 9], j: &Expr, f: &[Expr]) -> Vec<Expr> {
         let mut sigma = Vec::new();
         for i in 0..3 {
             for k in 0..3 {
                 let terms =
-                    (0..3).map(|m| Expr::Product(vec![stress[3 * i + m].clone(), f[3 * k + m].into()])).collect();
+                    (0..3).map(|m| Expr::Product(vec![stress[3 * i + m].clone(), f[3 * k + m].clone()])).collect();
                 let tau = self.quantities.stage(format!("tau{i}{k}"), Expr::Sum(terms));
-                sigma.push(Expr::from(tau) * Expr::from(j).pow(Rational::from_integer(-1)));
+                sigma.push(Expr::from(tau) * j.clone().pow(Rational::from_integer(-1)));
             }
         }
         sigma

@@ -21,6 +21,19 @@ pub enum Base {
     A,
     /// The small strain.
     Eps,
+    /// C = F'F: where nothing is differentiated and the body is far from rest.
+    C,
+}
+
+impl Base {
+    /// The tensor's name in generated text.
+    fn label(self) -> &'static str {
+        match self {
+            Base::A => "A",
+            Base::Eps => "eps",
+            Base::C => "C",
+        }
+    }
 }
 
 /// A scalar function of the strain from which energies are made.
@@ -107,9 +120,11 @@ impl Strain {
             let symmetric = g[3 * a + b].clone() + g[3 * b + a].clone();
             let square =
                 |x: &[Expr; 9]| Expr::Sum((0..3).map(|k| x[3 * k + a].clone() * x[3 * k + b].clone()).collect());
-            let (label, value, definition) = match base {
-                Base::Eps => ("eps", Expr::ratio(1, 2) * symmetric.clone(), Expr::ratio(1, 2) * symmetric),
-                Base::A => ("A", symmetric + square(&g), square(&f)),
+            let label = base.label();
+            let (value, definition) = match base {
+                Base::Eps => (Expr::ratio(1, 2) * symmetric.clone(), Expr::ratio(1, 2) * symmetric),
+                Base::A => (symmetric + square(&g), square(&f)),
+                Base::C => (square(&f), square(&f)),
             };
             let mut partials = Vec::new();
             for s in definition.symbols() {
@@ -161,7 +176,7 @@ impl Strain {
         if let Some(&s) = self.invariants.get(&invariant) {
             return Ok(s);
         }
-        let label = |b: Base| if b == Base::A { "A" } else { "eps" };
+        let label = Base::label;
         let symbol = match invariant {
             Invariant::J => self.jacobian(cas, quantities),
             Invariant::Trace(b) => {

@@ -11,7 +11,7 @@ pub struct OperationCount {
     pub multiplications: u32,
     /// Divisions.
     pub divisions: u32,
-    /// Square roots, logarithms, exponentials and powers.
+    /// Square roots, logarithms, exponentials, their remainders and powers.
     pub functions: u32,
     /// Selections.
     pub selects: u32,
@@ -52,6 +52,7 @@ impl ValidKernel {
                     c.multiplications += 1;
                 }
                 Op::Sqrt(_) | Op::Ln(_) | Op::Exp(_) | Op::Log1p(_) | Op::Expm1(_) | Op::Powf(..) => c.functions += 1,
+                Op::Log1pmx(_) | Op::Expm1mx(_) => c.functions += 1,
                 Op::Select(..) => c.selects += 1,
             }
         }

@@ -1,6 +1,7 @@
 //! The reference meaning of a kernel: evaluates it value by value in any number type.
 
 use super::{Input, Op, Rational, ValidKernel};
+use crate::remainder;
 
 /// A number type in which a kernel can be interpreted.
 pub trait Number: Clone {
@@ -28,6 +29,10 @@ pub trait Number: Clone {
     fn log1p(&self) -> Self;
     /// exp(a) - 1.
     fn expm1(&self) -> Self;
+    /// a - ln(1 + a).
+    fn log1pmx(&self) -> Self;
+    /// exp(a) - 1 - a.
+    fn expm1mx(&self) -> Self;
     /// a to the power b.
     fn powf(&self, b: &Self) -> Self;
     /// Whether a > b.
@@ -74,6 +79,12 @@ macro_rules! float_number {
             }
             fn expm1(&self) -> Self {
                 <$t>::exp_m1(*self)
+            }
+            fn log1pmx(&self) -> Self {
+                <$t as remainder::Remainder>::log1pmx(*self)
+            }
+            fn expm1mx(&self) -> Self {
+                <$t as remainder::Remainder>::expm1mx(*self)
             }
             fn powf(&self, b: &Self) -> Self {
                 <$t>::powf(*self, *b)
@@ -135,6 +146,8 @@ impl ValidKernel {
                 Op::Exp(a) => x(a).exp(),
                 Op::Log1p(a) => x(a).log1p(),
                 Op::Expm1(a) => x(a).expm1(),
+                Op::Log1pmx(a) => x(a).log1pmx(),
+                Op::Expm1mx(a) => x(a).expm1mx(),
                 Op::Powf(a, b) => x(a).powf(x(b)),
                 Op::Select(l, r, a, b) => if x(l).greater(x(r)) { x(a) } else { x(b) }.clone(),
             };

@@ -11,6 +11,8 @@
 //! | `Add Sub Mul Div Neg` | IEEE arithmetic of the working type |
 //! | `Fma(a, b, c)` | a b + c rounded once: explicit, because Rust never contracts `a * b + c` |
 //! | `Sqrt Ln Exp Log1p Expm1` | the function of that name in the working type |
+//! | `Log1pmx(a)` | a - ln(1 + a), the remainder of the logarithm, accurate for small a |
+//! | `Expm1mx(a)` | exp(a) - 1 - a, the remainder of the exponential, accurate for small a |
 //! | `Powf(a, b)` | a to the power b, for a > 0 |
 //! | `Select(l, r, a, b)` | a where l > r, b elsewhere (also where a comparison with NaN is false) |
 //!
@@ -24,8 +26,8 @@
 //! **Not supported:** loops, calls, integers, reductions across elements, side effects, and any type but the one real
 //! type of a kernel. Printers accept only [`ValidKernel`], which [`KernelIr::validate`] alone makes.
 //!
-//! **Rest-state splitting** is a rewriting between derivation and this language: it needs `Log1p` and `Expm1`, which
-//! are here, and no other operation.
+//! **Two forms.** A kernel with the output [`Output::NearRest`] holds where that is positive; elsewhere the kernel
+//! `NAME_far` of the same derivation counts (see [`crate::derivation::PointKernel`]).
 
 mod build;
 mod count;
@@ -33,6 +35,7 @@ mod interpret;
 mod text;
 mod validate;
 
+pub use crate::remainder::Remainder;
 pub use build::Builder;
 pub use count::OperationCount;
 pub use interpret::{InterpretError, Number};
@@ -92,6 +95,8 @@ pub enum Output {
     Cauchy,
     /// Positive inside the law's domain: left side minus right side of the domain's inequality.
     DomainMargin,
+    /// Positive where the kernel's form, split at the state of rest, serves.
+    NearRest,
     /// G, 9 components.
     DisplacementGradient,
     /// The element's nodal forces, 3 a node.
@@ -117,6 +122,8 @@ pub enum Op {
     Exp(ValueId),
     Log1p(ValueId),
     Expm1(ValueId),
+    Log1pmx(ValueId),
+    Expm1mx(ValueId),
     Powf(ValueId, ValueId),
     Select(ValueId, ValueId, ValueId, ValueId),
 }
@@ -127,6 +134,7 @@ impl Op {
         match *self {
             Op::Input(..) | Op::Const(_) => vec![],
             Op::Neg(a) | Op::Sqrt(a) | Op::Ln(a) | Op::Exp(a) | Op::Log1p(a) | Op::Expm1(a) => vec![a],
+            Op::Log1pmx(a) | Op::Expm1mx(a) => vec![a],
             Op::Add(a, b) | Op::Sub(a, b) | Op::Mul(a, b) | Op::Div(a, b) | Op::Powf(a, b) => vec![a, b],
             Op::Fma(a, b, c) => vec![a, b, c],
             Op::Select(a, b, c, d) => vec![a, b, c, d],
@@ -148,6 +156,8 @@ impl Op {
             Op::Exp(a) => Op::Exp(f(a)),
             Op::Log1p(a) => Op::Log1p(f(a)),
             Op::Expm1(a) => Op::Expm1(f(a)),
+            Op::Log1pmx(a) => Op::Log1pmx(f(a)),
+            Op::Expm1mx(a) => Op::Expm1mx(f(a)),
             Op::Powf(a, b) => Op::Powf(f(a), f(b)),
             Op::Select(a, b, c, d) => Op::Select(f(a), f(b), f(c), f(d)),
         }

@@ -37,7 +37,7 @@ fn input_length(role: Input) -> Option<u32> {
 fn output_length(role: Output) -> Option<usize> {
     match role {
         Output::Constants | Output::NodalForce | Output::NodeGradients => None,
-        Output::EnergyDensity | Output::DomainMargin => Some(1),
+        Output::EnergyDensity | Output::DomainMargin | Output::NearRest => Some(1),
         Output::Stress | Output::StressIncrement | Output::Cauchy | Output::DisplacementGradient => Some(9),
         Output::Diagonal => Some(3),
     }

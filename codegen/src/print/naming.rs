@@ -2,8 +2,8 @@
 
 use std::collections::HashSet;
 
-use crate::derivation::Derivation;
-use crate::ir::{Input, Op, ValidKernel};
+use crate::derivation::{Derivation, FAR, PointKernel};
+use crate::ir::{Input, Op, Output, ValidKernel};
 
 /// How a value is written where it is used.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -71,10 +71,30 @@ pub fn letter(role: Input) -> &'static str {
     }
 }
 
+/// What a kernel with two forms computes.
+pub fn point_docs(kernel: &PointKernel) -> String {
+    format!("{}\nNear rest by the form that is split there, by the textbook form elsewhere.", quantity(kernel.name()))
+}
+
 /// What a kernel computes and what that takes.
 pub fn kernel_docs(kernel: &ValidKernel) -> String {
     let c = kernel.count();
-    let what = match kernel.ir().name.as_str() {
+    let name = kernel.ir().name.as_str();
+    let splits = kernel.ir().outputs.iter().any(|(role, _)| *role == Output::NearRest);
+    let form = match name.strip_suffix(FAR) {
+        Some(_) => " Textbook form, for far from rest.",
+        None if splits => " Split at rest; holds where the last value is positive.",
+        None => "",
+    };
+    let what = quantity(name.strip_suffix(FAR).unwrap_or(name));
+    format!(
+        "{what}{form}\n{} additions, {} multiplications, {} divisions, {} functions.",
+        c.additions, c.multiplications, c.divisions, c.functions
+    )
+}
+
+fn quantity(name: &str) -> &'static str {
+    match name {
         "energy" => "W, the strain energy density, at G.",
         "force" => "P = dW/dG, the first Piola-Kirchhoff stress, at G.",
         "dforce" => "dP = d2W/dG2 : dG at G.",
@@ -84,11 +104,7 @@ pub fn kernel_docs(kernel: &ValidKernel) -> String {
         "contract" => "f_j = -w P grad Lambda_j.",
         "node_gradients" => "grad Lambda_j of every node.",
         _ => "",
-    };
-    format!(
-        "{what}\n{} additions, {} multiplications, {} divisions, {} functions.",
-        c.additions, c.multiplications, c.divisions, c.functions
-    )
+    }
 }
 
 /// The constants for the reader: `c[0] = mu`, ...

@@ -3,7 +3,7 @@
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{ToTokens, format_ident, quote};
 
-use crate::derivation::Derivation;
+use crate::derivation::{Derivation, PointKernel};
 use crate::element::ElementKernels;
 use crate::ir::{Input, Op, Output, Rational, ValidKernel, ValueId};
 use crate::law::ast::{Law, Parameter};
@@ -23,11 +23,19 @@ pub fn law_module(law: &Law, derivation: &Derivation, reviewed: bool) -> TokenSt
     let docs = doc_comment(&docs);
     let info = info(law, derivation, reviewed);
     let material = material(derivation.kernel("material"));
-    let has_margin = |k: &ValidKernel| k.ir().outputs.iter().any(|(r, _)| *r == Output::DomainMargin);
-    let point = ["energy", "force", "dforce", "diagonal", "cauchy"].map(|name| {
-        let kernel = derivation.kernel(name);
-        let needs_margin = matches!(name, "energy" | "force") && !has_margin(kernel);
-        point_kernel(kernel, needs_margin)
+    let point = ["energy", "force", "dforce", "diagonal", "cauchy"].map(|name| derivation.point(name));
+    let needs_margin = |k: &PointKernel| {
+        matches!(k.name(), "energy" | "force") && !k.outputs().any(|(role, _)| *role == Output::DomainMargin)
+    };
+    let methods = point.iter().map(|k| match k.far {
+        None => point_kernel(k.near, k.name(), needs_margin(k)),
+        Some(far) => two_forms(k, far, needs_margin(k)),
+    });
+    let forms = point.iter().filter_map(|k| k.far.map(|far| (k, far))).map(|(k, far)| {
+        let margin = needs_margin(k);
+        let near = point_kernel(k.near, &format!("{}_near", k.name()), margin);
+        let far = point_kernel(far, &far.ir().name, margin);
+        quote!(#near #[cold] #[inline(never)] #far)
     });
     quote! {
         #docs
@@ -41,8 +49,9 @@ pub fn law_module(law: &Law, derivation: &Derivation, reviewed: bool) -> TokenSt
             impl ::tensormass_kernels::Law for Law {
                 fn info() -> &'static LawInfo { &INFO }
                 #material
-                #(#point)*
+                #(#methods)*
             }
+            #(#forms)*
         }
     }
 }
@@ -174,23 +183,29 @@ fn material(kernel: &ValidKernel) -> TokenStream {
 }
 
 fn arguments(kernel: &ValidKernel) -> Vec<TokenStream> {
-    kernel
-        .ir()
-        .inputs
-        .iter()
-        .map(|&(role, len)| {
-            let used = kernel.reads(role);
-            let name = argument(role, used);
-            match role {
-                Input::Constants => quote!(#name: &[R]),
-                Input::Weight => quote!(#name: R),
-                _ => {
-                    let len = plain(len as usize);
-                    quote!(#name: &[R; #len])
-                }
-            }
-        })
-        .collect()
+    kernel.ir().inputs.iter().map(|&(role, len)| argument_type(role, kernel.reads(role), len)).collect()
+}
+
+fn argument_type(role: Input, used: bool, len: u32) -> TokenStream {
+    let name = argument(role, used);
+    match role {
+        Input::Constants => quote!(#name: &[R]),
+        Input::Weight => quote!(#name: R),
+        _ => {
+            let len = plain(len as usize);
+            quote!(#name: &[R; #len])
+        }
+    }
+}
+
+fn array_type(len: usize) -> TokenStream {
+    match len {
+        1 => quote!(R),
+        n => {
+            let n = plain(n);
+            quote!([R; #n])
+        }
+    }
 }
 
 fn argument(role: Input, used: bool) -> Ident {
@@ -202,8 +217,46 @@ fn plain(n: usize) -> Literal {
     Literal::usize_unsuffixed(n)
 }
 
-fn point_kernel(kernel: &ValidKernel, needs_margin: bool) -> TokenStream {
-    let name = format_ident!("{}", kernel.ir().name);
+/// The kernel of a point that chooses between its two forms, value by value where several points are computed at once.
+fn two_forms(kernel: &PointKernel, far: &ValidKernel, needs_margin: bool) -> TokenStream {
+    let name = format_ident!("{}", kernel.name());
+    let (near_name, far_name) = (format_ident!("{}_near", kernel.name()), format_ident!("{}", far.ir().name));
+    let arguments = kernel.near.ir().inputs.iter().map(|&(role, len)| argument_type(role, true, len));
+    let names: Vec<Ident> = kernel.near.ir().inputs.iter().map(|&(role, _)| argument(role, true)).collect();
+    let lengths: Vec<usize> = kernel.outputs().map(|(_, ids)| ids.len()).chain(needs_margin.then_some(1)).collect();
+    let mut types = lengths.iter().map(|&n| array_type(n)).collect::<Vec<_>>();
+    let [near, other] = ["n", "f"].map(|p| (0..lengths.len()).map(|k| format_ident!("{p}{k}")).collect::<Vec<_>>());
+    let chosen = near.iter().zip(&other).zip(&lengths).map(|((n, f), &len)| match len {
+        1 => quote!(R::select_greater(near, zero, #n, #f)),
+        _ => quote!(::std::array::from_fn(|k| R::select_greater(near, zero, #n[k], #f[k]))),
+    });
+    // The near form has the margin of its own form last, but for a margin of a law without a domain.
+    let (mut pattern, near_name_value) = (near.iter().map(|n| quote!(#n)).collect::<Vec<_>>(), format_ident!("near"));
+    let place = if needs_margin { pattern.len() - 1 } else { pattern.len() };
+    pattern.insert(place, quote!(#near_name_value));
+    let result = if types.len() == 1 { types.remove(0) } else { quote!((#(#types),*)) };
+    let near_result = if near.len() == 1 { quote!(#(#near)*) } else { quote!((#(#near),*)) };
+    let far_pattern = if other.len() == 1 { quote!(#(#other)*) } else { quote!((#(#other),*)) };
+    let chosen = if lengths.len() == 1 { quote!(#(#chosen)*) } else { quote!((#(#chosen),*)) };
+    let docs = doc_comment(&naming::point_docs(kernel));
+    quote! {
+        #docs
+        #[inline(always)]
+        fn #name<R: Real>(#(#arguments),*) -> #result {
+            let (#(#pattern),*) = #near_name(#(#names),*);
+            if near.is_positive() {
+                return #near_result;
+            }
+            let zero = R::from_f64(0.0);
+            let #far_pattern = #far_name(#(#names),*);
+            #chosen
+        }
+    }
+}
+
+fn point_kernel(kernel: &ValidKernel, name: &str, needs_margin: bool) -> TokenStream {
+    let inline = if name.ends_with(crate::derivation::FAR) { quote!() } else { quote!(#[inline(always)]) };
+    let name = format_ident!("{name}");
     let arguments = arguments(kernel);
     let (result, body) = (result(kernel, needs_margin), body(kernel, needs_margin));
     let docs = doc_comment(&kernel_docs(kernel));
@@ -213,7 +266,7 @@ fn point_kernel(kernel: &ValidKernel, needs_margin: bool) -> TokenStream {
     });
     quote! {
         #docs
-        #[inline(always)]
+        #inline
         fn #name<R: Real>(#(#arguments),*) -> #result {
             #constants
             #body
@@ -222,18 +275,7 @@ fn point_kernel(kernel: &ValidKernel, needs_margin: bool) -> TokenStream {
 }
 
 fn result(kernel: &ValidKernel, needs_margin: bool) -> TokenStream {
-    let mut types: Vec<TokenStream> = kernel
-        .ir()
-        .outputs
-        .iter()
-        .map(|(_, ids)| match ids.len() {
-            1 => quote!(R),
-            n => {
-                let n = plain(n);
-                quote!([R; #n])
-            }
-        })
-        .collect();
+    let mut types: Vec<TokenStream> = kernel.ir().outputs.iter().map(|(_, ids)| array_type(ids.len())).collect();
     if needs_margin {
         types.push(quote!(R));
     }
@@ -312,6 +354,8 @@ fn statements(kernel: &ValidKernel, names: &[TokenStream], host: bool) -> Vec<To
             Op::Exp(a) => call("exp", &[a]),
             Op::Log1p(a) => call("ln_1p", &[a]),
             Op::Expm1(a) => call("exp_m1", &[a]),
+            Op::Log1pmx(a) => call("log1pmx", &[a]),
+            Op::Expm1mx(a) => call("expm1mx", &[a]),
             Op::Powf(a, b) => call("powf", &[a, b]),
             Op::Select(l, r, a, b) => call("select_greater", &[l, r, a, b]),
         };

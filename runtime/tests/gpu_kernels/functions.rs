@@ -9,6 +9,7 @@ use tensormass_kernels::shader::{Binding, LawShaders, Shader};
 use tensormass_runtime::body::LawBatch;
 use tensormass_runtime::gpu::{Gpu, GpuOptions};
 use tensormass_runtime::laws;
+use tensormass_testing::codegen::ir::Remainder;
 use tensormass_testing::codegen::print::wgsl::helper_functions;
 use tensormass_testing::random::Rng;
 use tensormass_testing::rounding::printed;
@@ -101,7 +102,7 @@ fn near(rng: &mut Rng) -> bool {
     rng.uniform(0.0, 1.0) < 0.5
 }
 
-const FUNCTIONS: [Function; 5] = [
+const FUNCTIONS: [Function; 7] = [
     Function {
         text: "ln_(a)",
         exact: |a, _| a.ln(),
@@ -138,6 +139,26 @@ const FUNCTIONS: [Function; 5] = [
         argument: |rng| {
             let x = logarithmic(rng, 1e-30, 2.0);
             [if near(rng) { signed(rng, x) } else { rng.uniform(-100.0, 88.72) }, 0.0]
+        },
+    },
+    Function {
+        text: "log1pmx_(a)",
+        exact: |a, _| Remainder::log1pmx(a),
+        units: |_, _| printed::LOG1PMX,
+        division: 3.0,
+        argument: |rng| {
+            let x = logarithmic(rng, 1e-15, 1e30);
+            [if near(rng) { signed(rng, 1.0) * logarithmic(rng, 1e-9, 0.999_999) } else { x }, 0.0]
+        },
+    },
+    Function {
+        text: "expm1mx_(a)",
+        exact: |a, _| Remainder::expm1mx(a),
+        units: |_, _| printed::EXPM1MX,
+        division: 0.0,
+        argument: |rng| {
+            let x = logarithmic(rng, 1e-15, 2.0);
+            [if near(rng) { signed(rng, x) } else { rng.uniform(-80.0, 80.0) }, 0.0]
         },
     },
     Function {

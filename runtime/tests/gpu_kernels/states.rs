@@ -174,9 +174,9 @@ impl Analysis {
 
     /// Interprets a point kernel; the outputs by role.
     fn point(&self, law: &str, kernel: &str, inputs: &[(Input, &[Bound])]) -> Vec<(Output, Vec<Bound>)> {
-        let kernel = self.derivations[law].kernel(kernel);
+        let kernel = self.derivations[law].point(kernel);
         let values = kernel.interpret(inputs).expect("the inputs of a point kernel");
-        kernel.ir().outputs.iter().map(|(role, _)| *role).zip(values).collect()
+        kernel.outputs().map(|(role, _)| *role).zip(values).collect()
     }
 
     fn gradient(&self, nodes: &[u32; 4], u: &[[f64; 3]], shape: &[Bound]) -> Vec<Bound> {

@@ -132,7 +132,7 @@ impl Point {
     fn bounds(&self, kernel: &str, inputs: &[(Input, &[Rounded])]) -> Vec<Vec<Rounded>> {
         let mut all = vec![(Input::Constants, self.constants.as_slice())];
         all.extend_from_slice(inputs);
-        self.derivation.kernel(kernel).interpret(&all).expect("the inputs of a point kernel")
+        self.derivation.point(kernel).interpret(&all).expect("the inputs of a point kernel")
     }
 
     fn bounded<const N: usize>(&self, values: [f64; N], bounds: &[Rounded]) -> [Rounded; N] {

@@ -7,7 +7,7 @@
 
 use std::marker::PhantomData;
 
-use tensormass_codegen::ir::{Number, Rational};
+use tensormass_codegen::ir::{Number, Rational, Remainder};
 
 /// The unit round-off of f32.
 pub const SINGLE: f64 = 5.960_464_477_539_063e-8;
@@ -33,6 +33,10 @@ pub trait Accuracy: Copy + std::fmt::Debug + PartialEq {
     const LOG1P: f64;
     /// exp(x) - 1.
     const EXPM1: f64;
+    /// x - ln(1 + x).
+    const LOG1PMX: f64;
+    /// exp(x) - 1 - x.
+    const EXPM1MX: f64;
     /// A power whose logarithm has this magnitude.
     fn powf(logarithm: f64) -> f64;
 }
@@ -50,6 +54,9 @@ impl Accuracy for Cpu {
     const EXP: f64 = 2.0;
     const LOG1P: f64 = 2.0;
     const EXPM1: f64 = 2.0;
+    // Within 4 units, as their text says.
+    const LOG1PMX: f64 = 8.0;
+    const EXPM1MX: f64 = 8.0;
     fn powf(_: f64) -> f64 {
         2.0
     }
@@ -66,6 +73,10 @@ pub mod printed {
     pub const EXP: f64 = 2.0;
     /// `expm1_`.
     pub const EXPM1: f64 = 3.0;
+    /// `log1pmx_`.
+    pub const LOG1PMX: f64 = 6.0;
+    /// `expm1mx_`.
+    pub const EXPM1MX: f64 = 8.0;
     /// `powf_` of a power whose logarithm has this magnitude.
     pub fn powf(logarithm: f64) -> f64 {
         3.0 + 5.0 * logarithm
@@ -94,6 +105,9 @@ impl Accuracy for Wgsl {
     const EXP: f64 = 2.0 * printed::EXP;
     const LOG1P: f64 = 2.0 * printed::LOG1P + 2.0;
     const EXPM1: f64 = 2.0 * printed::EXPM1;
+    // y = x / (2 + x) enters as x y, and to the third power in what is subtracted, which is at most a quarter of that.
+    const LOG1PMX: f64 = 2.0 * printed::LOG1PMX + 6.0;
+    const EXPM1MX: f64 = 2.0 * printed::EXPM1MX;
     fn powf(logarithm: f64) -> f64 {
         // exp_(b * ln_(a)): the argument's relative error becomes |b ln a| times as large.
         Self::EXP + logarithm * (1.0 + Self::LN)
@@ -253,6 +267,13 @@ impl<A: Accuracy> Number for Bounded<A> {
     }
     fn expm1(&self) -> Self {
         self.function(self.value.exp_m1(), self.value.exp(), A::EXPM1)
+    }
+    fn log1pmx(&self) -> Self {
+        let x = self.value;
+        self.function(Remainder::log1pmx(x), x / (1.0 + x), A::LOG1PMX)
+    }
+    fn expm1mx(&self) -> Self {
+        self.function(Remainder::expm1mx(self.value), self.value.exp_m1(), A::EXPM1MX)
     }
     fn powf(&self, b: &Self) -> Self {
         let value = self.value.powf(b.value);

@@ -2,9 +2,9 @@
 
 use super::binding::{Binding, declarations};
 use super::{Shader, comment, function, helpers};
-use crate::derivation::Derivation;
+use crate::derivation::{Derivation, PointKernel};
 use crate::element::ElementKernels;
-use crate::ir::{Input, Output, ValidKernel};
+use crate::ir::{Input, Output};
 use crate::law::ast::Law;
 use crate::print::naming;
 
@@ -35,7 +35,7 @@ pub const NAMES: [&str; 5] = ["energy", "force", "dforce", "diagonal", "cauchy"]
 /// What one pass has and needs: decided once, for its bindings and for its text.
 struct Needs<'a> {
     pass: Pass,
-    point: &'a ValidKernel,
+    point: PointKernel<'a>,
     element: &'a ElementKernels,
 }
 
@@ -65,7 +65,7 @@ impl Needs<'_> {
     }
 
     fn margin(&self) -> bool {
-        self.point.ir().outputs.iter().any(|(role, _)| *role == Output::DomainMargin)
+        self.point.outputs().any(|(role, _)| *role == Output::DomainMargin)
     }
 
     fn bindings(&self) -> Vec<Binding> {
@@ -102,7 +102,7 @@ pub fn law_shaders(law: &Law, derivation: &Derivation, element: &ElementKernels)
         derivation.hash
     ));
     std::array::from_fn(|k| {
-        let needs = Needs { pass: PASSES[k], point: derivation.kernel(NAMES[k]), element };
+        let needs = Needs { pass: PASSES[k], point: derivation.point(NAMES[k]), element };
         let bindings = needs.bindings();
         Shader { text: format!("{banner}\n{}", module(&needs, &bindings)), bindings }
     })
@@ -111,7 +111,7 @@ pub fn law_shaders(law: &Law, derivation: &Derivation, element: &ElementKernels)
 fn module(needs: &Needs, bindings: &[Binding]) -> String {
     let stride = if bindings.contains(&Binding::Constants) { STRIDE } else { "" };
     let mut out = format!("{OVERRIDES}{stride}\n{}", declarations(bindings));
-    out += &helpers::texts(&function::helpers(needs.point).collect::<Vec<_>>());
+    out += &helpers::texts(&function::point_helpers(&needs.point));
     if needs.shape_gradients() {
         out += &shape_gradients();
     }
@@ -127,11 +127,11 @@ fn module(needs: &Needs, bindings: &[Binding]) -> String {
         (needs.gathers(), &needs.element.gradient),
         (needs.reads(Input::NodeGradient), &needs.element.node_gradients),
         (needs.contracts(), &needs.element.contract),
-        (true, needs.point),
     ];
     for (_, kernel) in functions.iter().filter(|(needed, _)| *needed) {
-        out += &function::function(kernel);
+        out += &function::function(kernel, &kernel.ir().name);
     }
+    out += &function::point_function(&needs.point);
     out += &one_element(needs);
     out += &entry_point(needs.pass == Pass::DForce);
     out
@@ -178,10 +178,10 @@ fn gather(name: &str, array: &str) -> String {
 
 /// The call of the point kernel; `node_gradient` is the expression of the gradient at one node.
 fn call(needs: &Needs, node_gradient: &str) -> String {
-    let arguments: Vec<&str> = function::read_inputs(needs.point)
+    let arguments: Vec<&str> = function::point_inputs(&needs.point)
         .map(|(role, _)| if role == Input::NodeGradient { node_gradient } else { naming::letter(role) })
         .collect();
-    format!("{}({})", needs.point.ir().name, arguments.join(", "))
+    format!("{}({})", needs.point.name(), arguments.join(", "))
 }
 
 fn offset(first: &str, k: u32) -> String {
@@ -201,7 +201,7 @@ fn one_element(needs: &Needs) -> String {
     if needs.volume() {
         line("let volume = rest[e].w;");
     }
-    if let Some((_, count)) = function::read_inputs(needs.point).find(|(role, _)| *role == Input::Constants) {
+    if let Some((_, count)) = function::point_inputs(&needs.point).find(|(role, _)| *role == Input::Constants) {
         line("let first = constants_stride * e;");
         let values: Vec<String> = (0..count).map(|k| format!("constants[{}]", offset("first", k))).collect();
         line(&format!("let c = {};", function::array(&values, "    ")));
@@ -227,7 +227,7 @@ fn one_element(needs: &Needs) -> String {
 
 /// Stores what the point kernel gives in `point`.
 fn store(needs: &Needs, line: &mut impl FnMut(&str)) {
-    let several = needs.point.ir().outputs.len() > 1;
+    let several = needs.point.outputs().count() > 1;
     let output = |role| if several { format!("point.{}", function::field(role)) } else { "point".to_string() };
     match needs.pass {
         Pass::Energy => line(&format!("energies[e] = {} * volume;", output(Output::EnergyDensity))),

@@ -2,12 +2,59 @@
 
 use super::helpers::Helper;
 use super::words;
+use crate::derivation::PointKernel;
 use crate::ir::{Input, Number, Op, Output, Rational, ValidKernel, ValueId};
 use crate::print::naming::{self, ValueName, letter};
 
-/// The function of a kernel, with the structure that it returns if it has several outputs. Only inputs that the kernel
+/// The function of a kernel at a point: of two forms, the one that counts.
+pub fn point_function(kernel: &PointKernel) -> String {
+    let Some(far) = kernel.far else { return function(kernel.near, kernel.name()) };
+    let (name, near_name) = (kernel.name(), format!("{}_near", kernel.name()));
+    let forms = format!("{}{}", function(kernel.near, &near_name), function(far, &far.ir().name));
+    let (mut arguments, mut values, mut far_values) = (vec![], vec![], vec![]);
+    for (role, len) in point_inputs(kernel) {
+        let letter = letter(role);
+        arguments.push(format!("{letter}: array<f32, {len}>"));
+        if kernel.near.reads(role) {
+            values.push(letter);
+        }
+        if far.reads(role) {
+            far_values.push(letter);
+        }
+    }
+    let outputs: Vec<_> = kernel.outputs().map(|(role, ids)| (*role, ids.len())).collect();
+    let (structure, result) = result_type(name, &outputs);
+    let fields = |value: &str| outputs.iter().map(|(role, _)| format!("{value}.{}", field(*role))).collect::<Vec<_>>();
+    let (near, other) = match outputs.len() {
+        1 => (fields("near").concat(), "far".to_string()),
+        _ => (format!("{result}({})", fields("near").join(", ")), format!("{result}({})", fields("far").join(", "))),
+    };
+    let docs = super::comment(&naming::point_docs(kernel));
+    format!(
+        "{forms}\n{structure}{docs}fn {name}({}) -> {result} {{\n    let near = {near_name}({});\n    if near.near > 0.0f {{\n        \
+         return {near};\n    }}\n    let far = {}({});\n    return {other};\n}}\n",
+        arguments.join(", "),
+        values.join(", "),
+        far.ir().name,
+        far_values.join(", ")
+    )
+}
+
+/// The type of a function's result, and the structure that it is where it has several parts.
+fn result_type(name: &str, outputs: &[(Output, usize)]) -> (String, String) {
+    match outputs {
+        [(role, len)] => (String::new(), kind(*role, *len)),
+        several => {
+            let name = format!("{name}_result");
+            let fields = several.iter().map(|(role, len)| format!("    {}: {},\n", field(*role), kind(*role, *len)));
+            (format!("struct {name} {{\n{}}}\n\n", fields.collect::<String>()), name)
+        }
+    }
+}
+
+/// The function of a kernel under a name, with the structure that it returns if it has several outputs. Only inputs that the kernel
 /// reads are arguments, in the kernel's order.
-pub fn function(kernel: &ValidKernel) -> String {
+pub fn function(kernel: &ValidKernel, name: &str) -> String {
     let ir = kernel.ir();
     let arguments: Vec<String> = read_inputs(kernel)
         .map(|(role, len)| match role {
@@ -24,22 +71,17 @@ pub fn function(kernel: &ValidKernel) -> String {
     }
     let outputs: Vec<(Output, Vec<&str>)> =
         ir.outputs.iter().map(|(role, ids)| (*role, ids.iter().map(|v| names[v.index()].as_str()).collect())).collect();
-    let (structure, result, value) = match outputs.as_slice() {
-        [(role, values)] => (String::new(), kind(*role, values.len()), value(*role, values, "    ")),
+    let lengths: Vec<_> = outputs.iter().map(|(role, values)| (*role, values.len())).collect();
+    let (structure, result) = result_type(name, &lengths);
+    let value = match outputs.as_slice() {
+        [(role, values)] => value(*role, values, "    "),
         several => {
-            let name = format!("{}_result", ir.name);
-            let fields = several.iter().map(|(role, v)| format!("    {}: {},\n", field(*role), kind(*role, v.len())));
-            let structure = format!("struct {name} {{\n{}}}\n\n", fields.collect::<String>());
             let values = several.iter().map(|(role, v)| format!("        {},\n", value(*role, v, "        ")));
-            (structure, name.clone(), format!("{name}(\n{}    )", values.collect::<String>()))
+            format!("{result}(\n{}    )", values.collect::<String>())
         }
     };
     let docs = super::comment(&naming::kernel_docs(kernel));
-    format!(
-        "\n{structure}{docs}fn {}({}) -> {result} {{\n{body}    return {value};\n}}\n",
-        ir.name,
-        arguments.join(", ")
-    )
+    format!("\n{structure}{docs}fn {name}({}) -> {result} {{\n{body}    return {value};\n}}\n", arguments.join(", "))
 }
 
 /// The field of a kernel's result that holds an output, where it has several.
@@ -52,6 +94,7 @@ pub fn field(role: Output) -> &'static str {
         Output::Diagonal => "d",
         Output::Cauchy => "sigma",
         Output::DomainMargin => "margin",
+        Output::NearRest => "near",
         Output::DisplacementGradient => "g",
         Output::NodalForce => "f",
         Output::NodeGradients => "n",
@@ -61,6 +104,17 @@ pub fn field(role: Output) -> &'static str {
 /// The inputs that a kernel reads, with their lengths.
 pub fn read_inputs(kernel: &ValidKernel) -> impl Iterator<Item = (Input, u32)> {
     kernel.ir().inputs.iter().copied().filter(|&(role, _)| kernel.reads(role))
+}
+
+/// The inputs that a kernel's forms read, with their lengths.
+pub fn point_inputs<'a>(kernel: &PointKernel<'a>) -> impl Iterator<Item = (Input, u32)> + use<'a> {
+    let kernel = *kernel;
+    kernel.near.ir().inputs.iter().copied().filter(move |&(role, _)| kernel.reads(role))
+}
+
+/// The helpers that a kernel's forms call.
+pub fn point_helpers(kernel: &PointKernel) -> Vec<Helper> {
+    helpers(kernel.near).chain(kernel.far.into_iter().flat_map(helpers)).collect()
 }
 
 /// An array's constructor, three values a line if it is long.
@@ -81,6 +135,8 @@ pub fn helpers(kernel: &ValidKernel) -> impl Iterator<Item = Helper> {
         Op::Exp(_) => Some(Helper::Exp),
         Op::Log1p(_) => Some(Helper::Log1p),
         Op::Expm1(_) => Some(Helper::Expm1),
+        Op::Log1pmx(_) => Some(Helper::Log1pmx),
+        Op::Expm1mx(_) => Some(Helper::Expm1mx),
         Op::Powf(..) => Some(Helper::Powf),
         Op::Input(..) | Op::Const(_) | Op::Add(..) | Op::Sub(..) | Op::Mul(..) | Op::Div(..) => None,
         Op::Neg(_) | Op::Fma(..) | Op::Sqrt(_) | Op::Select(..) => None,
@@ -89,7 +145,7 @@ pub fn helpers(kernel: &ValidKernel) -> impl Iterator<Item = Helper> {
 
 fn is_number(role: Output) -> bool {
     match role {
-        Output::EnergyDensity | Output::DomainMargin => true,
+        Output::EnergyDensity | Output::DomainMargin | Output::NearRest => true,
         Output::Constants | Output::Stress | Output::StressIncrement | Output::Diagonal | Output::Cauchy => false,
         Output::DisplacementGradient | Output::NodalForce | Output::NodeGradients => false,
     }
@@ -137,6 +193,8 @@ fn expression(op: Op, names: &[String]) -> Option<String> {
         Op::Exp(a) => format!("exp_({})", at(a)),
         Op::Log1p(a) => format!("log1p_({})", at(a)),
         Op::Expm1(a) => format!("expm1_({})", at(a)),
+        Op::Log1pmx(a) => format!("log1pmx_({})", at(a)),
+        Op::Expm1mx(a) => format!("expm1mx_({})", at(a)),
         Op::Powf(a, b) => format!("powf_({}, {})", at(a), at(b)),
         Op::Select(l, r, a, b) => format!("select({}, {}, {} > {})", at(b), at(a), at(l), at(r)),
     })

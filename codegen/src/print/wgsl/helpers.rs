@@ -26,6 +26,10 @@ pub enum Helper {
     Expm1,
     /// Power.
     Powf,
+    /// x - ln(1 + x).
+    Log1pmx,
+    /// exp(x) - 1 - x.
+    Expm1mx,
 }
 
 impl Helper {
@@ -38,6 +42,8 @@ impl Helper {
             Self::Exp => &[Self::Octaves, Self::ExpSeries],
             Self::Expm1 => &[Self::Octaves, Self::ExpSeries, Self::Exp],
             Self::Powf => &[Self::Ln, Self::Exp],
+            Self::Log1pmx => &[Self::Log1p],
+            Self::Expm1mx => &[Self::Expm1],
         }
     }
 
@@ -51,6 +57,8 @@ impl Helper {
             Self::Exp => EXP,
             Self::Expm1 => EXPM1,
             Self::Powf => POWF,
+            Self::Log1pmx => LOG1PMX,
+            Self::Expm1mx => EXPM1MX,
         }
     }
 }
@@ -67,9 +75,10 @@ pub fn texts(used: &[Helper]) -> String {
     all.into_iter().map(|h| format!("\n{}", h.text())).collect()
 }
 
-/// The texts of all helpers: `ln_`, `log1p_`, `exp_`, `expm1_`, `powf_` and what they call, for tests that measure them.
+/// The texts of all helpers (`ln_`, `log1p_`, `exp_`, `expm1_`, `powf_`, `log1pmx_`, `expm1mx_`) and of what they call, for
+/// tests that measure them.
 pub fn all() -> String {
-    texts(&[Helper::Ln, Helper::Log1p, Helper::Exp, Helper::Expm1, Helper::Powf])
+    texts(&[Helper::Ln, Helper::Exp, Helper::Powf, Helper::Log1pmx, Helper::Expm1mx])
 }
 
 // ln(1 + f) = 2 atanh(y) with y = f / (2 + f), and 2 y = f - y f: what is small is subtracted from f itself, so that
@@ -158,6 +167,44 @@ fn expm1_(x: f32) -> f32 {
     let scale = bitcast<f32>(bitcast<u32>(i32(t.x) + 127) << 23u);
     // At least -1 already: keeps a compiler from subtracting the 1 last.
     return fma(scale, exp_series_(t.y), max(scale - 1.0f, -1.0f));
+}
+";
+
+const LOG1PMX: &str = "\
+// x - ln(1 + x) for x > -1, within 4 units in the last place: y (x - 2 y^2 (1/3 + y^2/5 + ..)), y = x / (2 + x).
+fn log1pmx_(x: f32) -> f32 {
+    if x > -0.5f && x < 1.0f {
+        let y = x / (2.0f + x);
+        let z = y * y;
+        var s = fma(z, 0.05882353f, 0.06666667f);
+        s = fma(z, s, 0.07692308f);
+        s = fma(z, s, 0.09090909f);
+        s = fma(z, s, 0.11111111f);
+        s = fma(z, s, 0.14285715f);
+        s = fma(z, s, 0.2f);
+        s = fma(z, s, 0.33333334f);
+        return y * fma(-2.0f * z, s, x);
+    }
+    return x - log1p_(x);
+}
+";
+
+const EXPM1MX: &str = "\
+// exp(x) - 1 - x, within 4 units in the last place: x^2 (1/2 + x/6 + ..) up to |x| = 1.
+fn expm1mx_(x: f32) -> f32 {
+    if x > -1.0f && x < 1.0f {
+        var s = fma(x, 2.5052108e-08f, 2.755732e-07f);
+        s = fma(x, s, 2.7557319e-06f);
+        s = fma(x, s, 2.4801588e-05f);
+        s = fma(x, s, 0.0001984127f);
+        s = fma(x, s, 0.0013888889f);
+        s = fma(x, s, 0.008333334f);
+        s = fma(x, s, 0.041666668f);
+        s = fma(x, s, 0.16666667f);
+        s = fma(x, s, 0.5f);
+        return x * x * s;
+    }
+    return expm1_(x) - x;
 }
 ";
 

@@ -32,7 +32,7 @@ pub struct Shader {
 /// A kernel as a function of its name, with the helper functions that it calls: for tests of what a text computes.
 pub fn function(kernel: &crate::ir::ValidKernel) -> String {
     let helpers = helpers::texts(&function::helpers(kernel).collect::<Vec<_>>());
-    format!("{helpers}{}", function::function(kernel))
+    format!("{helpers}{}", function::function(kernel, &kernel.ir().name))
 }
 
 /// A shader as a Rust expression of the kernels crate's `Shader`.

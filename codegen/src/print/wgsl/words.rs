@@ -34,12 +34,14 @@ const LANGUAGE: &str = "
 /// Functions and variables of the texts around a kernel, except bindings and helpers, which say their own names.
 const OURS: &str = "
     work_group_size elements_per_invocation constants_stride main element group groups local shape_gradients nodal_displacement
-    nodal_increment gradient contract node_gradients energy force dforce diagonal cauchy e volume slot node point";
+    nodal_increment gradient contract node_gradients energy force dforce diagonal cauchy e volume slot node point near far";
 
 /// Whether a value may have this name.
 pub fn is_free(name: &str) -> bool {
-    // Helpers end in an underscore, structures of results in that word; two underscores at the beginning are reserved.
-    let of_form = !name.ends_with('_') && !name.ends_with("_result") && !name.starts_with("__");
+    // Helpers end in an underscore, structures of results and the two forms of kernels in those words; two underscores at
+    // the beginning are reserved.
+    let ours = ["_", "_result", "_near", "_far"].iter().any(|end| name.ends_with(end));
+    let of_form = !ours && !name.starts_with("__");
     let taken = LANGUAGE.split_whitespace().chain(OURS.split_whitespace()).any(|word| word == name);
     of_form && !taken && super::binding::BINDINGS.iter().all(|b| b.variable() != name)
 }

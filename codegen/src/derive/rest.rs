@@ -1,0 +1,133 @@
+//! What kernels compute near rest: the energy split over the Green strain, the stress split over G.
+
+use crate::expr::{Expr, Symbol};
+use crate::quantity::{Kind, Value};
+use crate::split::{Leaves, SplitError, Splitter};
+
+use super::strain::{Base, Invariant};
+use super::{DeriveError, Session};
+
+/// Splitting serves up to E:E = 4, that is A:A = 16 ..
+const GREATEST_STRAIN: i128 = 16;
+
+/// The energy near rest.
+pub struct NearEnergy {
+    /// W - W(0).
+    pub value: Expr,
+    /// Positive where it holds.
+    pub holds: Expr,
+}
+
+/// The stress near rest.
+pub struct NearStress {
+    /// P.
+    pub stress: [Expr; 9],
+    /// The domain's margin.
+    pub margin: Option<Expr>,
+    /// The Cauchy stress.
+    pub cauchy: Vec<Expr>,
+    /// Positive where they hold.
+    pub holds: Expr,
+}
+
+impl Session {
+    /// The energy split to second order, if a rule applies; and the energy at rest.
+    pub(super) fn near_energy(&mut self) -> Result<(Option<NearEnergy>, Expr), DeriveError> {
+        let used = self.strain.invariants();
+        let jacobian = used.iter().find(|(i, _)| *i == Invariant::J).map(|&(_, j)| j);
+        let mut leaves = Leaves::default();
+        if let Some(j) = jacobian {
+            let half = Expr::ratio(1, 2);
+            let (cas, quantities) = (&mut self.cas, &mut self.quantities);
+            let [trace, square, det] =
+                [Invariant::Trace(Base::A), Invariant::Ddot(Base::A, Base::A), Invariant::Det(Base::A)]
+                    .map(|i| self.strain.invariant(cas, quantities, i));
+            let (trace, square, det) = (trace?, square?, det?);
+            // I3 = J^2 = det(I + A) = 1 + p with p = tr A + II(A) + det A, II(A) = ((tr A)^2 - A:A) / 2.
+            let second = half * (Expr::from(trace).pow(2.into()) - square.into()) + det.into();
+            let second = self.quantities.stage("p_remainder", second);
+            let p = self.quantities.stage("p", Expr::from(trace) + second.into());
+            leaves.jacobian = Some((j, p, trace, second.into()));
+        }
+        for (invariant, s) in self.strain.invariants() {
+            match invariant {
+                Invariant::Trace(_) => leaves.linear.push(s),
+                Invariant::Ddot(..) | Invariant::Det(_) => leaves.quadratic.push(s),
+                Invariant::J => {}
+            }
+        }
+        let energy = self.energy.clone();
+        let splitter = Splitter::of_energy(&mut self.cas, &mut self.quantities, &mut self.rest, "energy", leaves);
+        let (near, at_rest) = splitter.energy(&energy)?;
+        let Some(value) = near else { return Ok((None, at_rest)) };
+        let holds = self.near_rest(jacobian.map(Expr::from), true)?;
+        Ok((Some(NearEnergy { value, holds }), at_rest))
+    }
+
+    /// The stress split to first order, if a rule applies.
+    pub(super) fn near_stress(&mut self, stress: &[Expr; 9]) -> Result<Option<NearStress>, DeriveError> {
+        let jacobian = self.strain.jacobian(&mut self.cas, &mut self.quantities);
+        let deformation = *self.strain.deformation();
+        let margin = self.margin.clone();
+        let mut splitter = Splitter::first(&mut self.cas, &mut self.quantities, &mut self.rest, "force");
+        let mut near = Vec::new();
+        let mut rewritten = false;
+        for p in stress {
+            let split = splitter.split(p)?;
+            if !split.rest.is_zero() {
+                return Err(SplitError::StressAtRest(splitter.print(p)).into());
+            }
+            rewritten |= split.rewritten.0;
+            near.push(split.change);
+        }
+        if !rewritten {
+            return Ok(None);
+        }
+        let margin = match margin {
+            Some(m) => Some(splitter.split(&m)?.value),
+            None => None,
+        };
+        let uses_j = splitter.has_split(jacobian);
+        let j = splitter.split(&jacobian.into())?.value;
+        let mut f: Vec<Expr> = Vec::new();
+        for s in deformation {
+            f.push(splitter.split(&s.into())?.value);
+        }
+        let stress: [Expr; 9] = near.try_into().expect("nine components");
+        let cauchy = self.cauchy_of(&stress, &j, &f);
+        let holds = self.near_rest(uses_j.then_some(j), !uses_j)?;
+        Ok(Some(NearStress { stress, margin, cauchy, holds }))
+    }
+
+    /// J, if the law uses it, and a quantity that is J with fewer roundings near rest, 1 + j where j > -1/2: tangents
+    /// divide by J more than once, and nothing in them cancels.
+    pub(super) fn accurate_jacobian(&mut self) -> Result<Option<(Symbol, Symbol)>, DeriveError> {
+        let Some(&(_, jacobian)) = self.strain.invariants().iter().find(|(i, _)| *i == Invariant::J) else {
+            return Ok(None);
+        };
+        let mut splitter = Splitter::first(&mut self.cas, &mut self.quantities, &mut self.rest, "force");
+        let split = splitter.split(&jacobian.into())?;
+        let accurate = Value::Select {
+            left: split.change,
+            right: Expr::ratio(-1, 2),
+            then: split.value,
+            otherwise: jacobian.into(),
+        };
+        Ok(Some((jacobian, self.quantities.add("J", Kind::Stage { value: accurate, partials: None }))))
+    }
+
+    /// Positive where j >= -1/2 and, if the strain is bounded too, E:E <= 4.
+    fn near_rest(&mut self, jacobian: Option<Expr>, bounded: bool) -> Result<Expr, DeriveError> {
+        let above_half = jacobian.map(|j| j - Expr::ratio(1, 2));
+        if !bounded && let Some(above_half) = above_half {
+            return Ok(above_half);
+        }
+        let square = self.strain.invariant(&mut self.cas, &mut self.quantities, Invariant::Ddot(Base::A, Base::A))?;
+        let small = Expr::int(GREATEST_STRAIN) - Expr::from(square);
+        let Some(above_half) = above_half else { return Ok(small) };
+        let least =
+            Value::Select { left: small.clone(), right: above_half.clone(), then: above_half, otherwise: small };
+        let least: Symbol = self.quantities.add("near_rest", Kind::Stage { value: least, partials: None });
+        Ok(least.into())
+    }
+}

@@ -1,0 +1,403 @@
+//! Rest-state splitting: rewrites textbook formulas so that what vanishes at rest is computed without cancellation.
+//!
+//! Every value is written as its exact constant at rest, which the generator knows as an expression in the parameters,
+//! and its change since, which alone is computed and vanishes at rest. Constants that cancel do so here, exactly; where
+//! the sum of constants is 0, only the change is printed. The rules, for values c + x:
+//!
+//! | textbook | change |
+//! |---|---|
+//! | (a + x) + (b + y) | x + y |
+//! | (a + x)(b + y) | a y + x (b + y) |
+//! | (a + x)^n, n = 2, 3, .. | x ((a + x)^(n-1) + .. + a^(n-1)) |
+//! | 1 / (a + x) | -x / (a (a + x)) |
+//! | sqrt(a + x) | x / (sqrt(a + x) + sqrt(a)) |
+//! | (a + x)^r | a^r expm1(r log1p(x / a)) |
+//! | ln(a + x) | log1p(x / a) |
+//! | exp(a + x) | e^a expm1(x) |
+//!
+//! Stresses are split over the displacement gradient ([`first`]). Energies are of second order at rest and are split
+//! over the Green strain, into constant, linear form and remainder ([`second`]): split over G they would lose
+//! their digits under rotation. Away from rest the changes cancel instead, and the textbook form counts: a kernel that
+//! was rewritten says where it holds (`NearRest`), and has a sibling for elsewhere.
+
+mod constant;
+mod functions;
+mod powers;
+mod product;
+mod second;
+
+use std::collections::HashMap;
+
+use crate::cas::{Cas, UnexpectedTerm};
+use crate::derivation::Rewrite;
+use crate::expr::{Expr, Symbol};
+use crate::quantity::{Kind, Quantities, Value};
+
+use constant::Constants;
+pub use second::{Leaves, Second};
+
+/// Why a law cannot be split at rest.
+#[derive(Debug, thiserror::Error)]
+pub enum SplitError {
+    /// The computer algebra system answered in unknown terms.
+    #[error(transparent)]
+    Cas(#[from] UnexpectedTerm),
+    /// A term has no expansion at rest, or none that is decided for every material.
+    #[error("the term `{term}` {reason}; {remedy}")]
+    Term {
+        /// The term, as text.
+        term: String,
+        /// What is wrong with it.
+        reason: String,
+        /// What the author can do.
+        remedy: String,
+    },
+    /// The stress at rest is not zero.
+    #[error(
+        "the stress at rest is not zero: the energy density begins with {0}, of first order in the strain; add the term \
+         that cancels it"
+    )]
+    StressAtRest(String),
+}
+
+/// A value as its constant at rest and its change since.
+#[derive(Debug, Clone)]
+pub struct Split {
+    /// The constant at rest, in the parameters alone.
+    pub rest: Expr,
+    /// The change: 0 at rest.
+    pub change: Expr,
+    /// The value itself, where it is needed as a factor or divisor.
+    pub value: Expr,
+    /// Whether a rule rewrote something in `change` and in `value`: what was not, stays the author's.
+    pub rewritten: (bool, bool),
+    /// The change of second order, where energies are split.
+    pub second: Option<Second>,
+}
+
+impl Split {
+    fn is_constant(&self) -> bool {
+        self.change.is_zero()
+    }
+}
+
+/// What the kernels of one derivation share: known constants, and the rewrites for the reader.
+#[derive(Debug, Default)]
+pub struct Rest {
+    constants: Constants,
+    /// The rewrites, in the order in which they were made.
+    pub rewrites: Vec<Rewrite>,
+}
+
+impl Rest {
+    /// For parameters with these ranges.
+    pub fn new(ranges: HashMap<Symbol, (f64, f64)>) -> Self {
+        Self { constants: Constants::new(ranges), rewrites: vec![] }
+    }
+}
+
+/// Splits the quantities of one kernel.
+pub struct Splitter<'a> {
+    cas: &'a mut Cas,
+    quantities: &'a mut Quantities,
+    rest: &'a mut Rest,
+    kernel: &'static str,
+    /// The splits of quantities; those given at the start are leaves.
+    known: HashMap<Symbol, Split>,
+    /// J and the quantity p with J = sqrt(1 + p), where J is to be written so.
+    jacobian: Option<(Symbol, Symbol)>,
+    order: Order,
+}
+
+/// To which order values are split.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Order {
+    First,
+    Second,
+}
+
+impl<'a> Splitter<'a> {
+    /// Splits to first order over G: for stresses.
+    pub fn first(cas: &'a mut Cas, quantities: &'a mut Quantities, rest: &'a mut Rest, kernel: &'static str) -> Self {
+        Self { cas, quantities, rest, kernel, known: HashMap::new(), jacobian: None, order: Order::First }
+    }
+
+    /// The split of an expression.
+    ///
+    /// # Errors
+    /// See [`SplitError`].
+    pub fn split(&mut self, e: &Expr) -> Result<Split, SplitError> {
+        if self.quantities.is_constant_expr(e) {
+            return self.constant(e.clone());
+        }
+        match e {
+            Expr::Number(_) => self.constant(e.clone()),
+            Expr::Symbol(s) => self.symbol(*s),
+            Expr::Sum(terms) => self.sum(e, terms),
+            Expr::Product(factors) => self.product(factors),
+            Expr::Power(base, exponent) => self.power(e, base, exponent),
+            Expr::Ln(a) => self.ln(e, a),
+            Expr::Exp(a) => self.exp(e, a),
+            Expr::Log1p(_) | Expr::Expm1(_) | Expr::Log1pmx(_) | Expr::Expm1mx(_) => Ok(self.opaque(e.clone())),
+        }
+    }
+
+    /// Whether the quantity took part in what was split so far.
+    pub fn has_split(&self, s: Symbol) -> bool {
+        self.known.contains_key(&s)
+    }
+
+    /// An expression as text.
+    pub fn print(&self, e: &Expr) -> String {
+        self.text(e)
+    }
+
+    fn constant(&mut self, e: Expr) -> Result<Split, SplitError> {
+        let rest = self.simplify(e)?;
+        Ok(Split {
+            rest: rest.clone(),
+            change: Expr::int(0),
+            value: rest,
+            rewritten: (false, false),
+            second: self.second(Second::zero),
+        })
+    }
+
+    /// A value that vanishes at rest and is computed as it stands.
+    fn opaque(&self, e: Expr) -> Split {
+        let second = self.second(|| Second::of_first_order(e.clone()));
+        Split { rest: Expr::int(0), change: e.clone(), value: e, rewritten: (false, false), second }
+    }
+
+    fn second(&self, second: impl FnOnce() -> Second) -> Option<Second> {
+        (self.order == Order::Second).then(second)
+    }
+
+    fn simplify(&mut self, e: Expr) -> Result<Expr, SplitError> {
+        Ok(self.rest.constants.simplify(self.cas, self.quantities, e)?)
+    }
+
+    fn text(&self, e: &Expr) -> String {
+        crate::print::expression(e, self.quantities)
+    }
+
+    /// Notes a rewrite for the reader.
+    fn note_split(&mut self, term: &Expr, split: &Split) {
+        let form = split.second.as_ref().map_or(&split.change, |s| &s.remainder);
+        let [term, rest, form] = [term, &split.rest, form].map(|e| self.text(e));
+        let rewrite = Rewrite { kernel: self.kernel.to_string(), term, rest, form };
+        if !self.rest.rewrites.contains(&rewrite) {
+            self.rest.rewrites.push(rewrite);
+        }
+    }
+
+    fn refuse<T>(&self, term: &Expr, reason: &str, remedy: &str) -> Result<T, SplitError> {
+        Err(SplitError::Term { term: self.text(term), reason: reason.into(), remedy: remedy.into() })
+    }
+
+    /// A name for an expression that is better not repeated.
+    fn named(&mut self, name: String, e: Expr) -> Expr {
+        if self.quantities.is_simple(&e) { e } else { self.quantities.stage(name, e).into() }
+    }
+
+    fn symbol(&mut self, s: Symbol) -> Result<Split, SplitError> {
+        if let Some(known) = self.known.get(&s) {
+            return Ok(known.clone());
+        }
+        if let Some((j, p)) = self.jacobian
+            && s == j
+        {
+            let form = (Expr::int(1) + p.into()).pow(crate::expr::Rational::new(1, 2));
+            let split = self.split(&form)?;
+            let split = self.name_parts(s, split);
+            self.known.insert(s, split.clone());
+            return Ok(split);
+        }
+        let quantity = self.quantities.get(s).clone();
+        let split = match &quantity.kind {
+            Kind::Constant(_) => self.constant(s.into())?,
+            Kind::Input(..) => self.opaque(s.into()),
+            Kind::Stage { value: Value::Expr(e), .. } => {
+                let split = self.split(e)?;
+                self.stage(s, e, split)
+            }
+            Kind::Stage { value: Value::Select { left, right, then, otherwise }, .. } => {
+                let split = self.select(s, [left, right, then, otherwise])?;
+                self.name_parts(s, split)
+            }
+        };
+        self.known.insert(s, split.clone());
+        Ok(split)
+    }
+
+    /// The split of a stage, computed by `e`, from that of `e`: what was not rewritten stays the stage.
+    fn stage(&mut self, s: Symbol, e: &Expr, split: Split) -> Split {
+        let unchanged = split.rest.is_zero() && !split.rewritten.0;
+        let value = split.rest.clone() + split.change.clone();
+        if unchanged || value == *e {
+            let mut split = split;
+            if unchanged {
+                split.change = s.into();
+            }
+            split.value = s.into();
+            split.rewritten.1 = false;
+            if let Some(second) = &mut split.second
+                && unchanged
+                && second.linear.is_empty()
+            {
+                second.remainder = s.into();
+            }
+            return split;
+        }
+        self.name_parts(s, split)
+    }
+
+    /// Names the parts of a stage's split after it; the value is the constant and the change.
+    fn name_parts(&mut self, s: Symbol, mut split: Split) -> Split {
+        let name = self.quantities.get(s).name.clone();
+        if !split.rest.is_zero() {
+            self.note_split(&s.into(), &split);
+        }
+        split.change = self.named(format!("{name}_change"), split.change);
+        split.value = if split.rest.is_zero() {
+            split.change.clone()
+        } else {
+            let value = split.rest.clone() + split.change.clone();
+            self.named(name.clone(), value)
+        };
+        if let Some(second) = &mut split.second {
+            second.remainder = if second.linear.is_empty() && second.is_whole {
+                split.change.clone()
+            } else {
+                let remainder = second.remainder.clone();
+                if self.quantities.is_simple(&remainder) {
+                    remainder
+                } else {
+                    self.quantities.stage(format!("{name}_remainder"), remainder).into()
+                }
+            };
+        }
+        split
+    }
+
+    fn sum(&mut self, e: &Expr, terms: &[Expr]) -> Result<Split, SplitError> {
+        let mut parts = Vec::new();
+        for t in terms {
+            parts.push(self.split(t)?);
+        }
+        let rests: Vec<Expr> = parts.iter().map(|p| p.rest.clone()).collect();
+        let had_rest = parts.iter().filter(|p| !p.is_constant()).any(|p| !p.rest.is_zero());
+        let rest = self.simplify(Expr::Sum(rests))?;
+        let change = total(parts.iter().map(|p| p.change.clone()));
+        let rewritten = parts.iter().any(|p| p.rewritten.0) || had_rest;
+        let values_rewritten = parts.iter().any(|p| p.rewritten.1);
+        let (value, value_rewritten) = if rest.is_zero() {
+            (change.clone(), rewritten)
+        } else {
+            (total(parts.iter().map(|p| p.value.clone())), values_rewritten)
+        };
+        let second = match self.order {
+            Order::First => None,
+            Order::Second => Some(self.second_of_sum(&parts, &change)?),
+        };
+        let cancelled = rest.is_zero() && had_rest;
+        let split = Split { rest, change, value, rewritten: (rewritten, value_rewritten), second };
+        if cancelled {
+            self.note_split(e, &split);
+        }
+        Ok(split)
+    }
+
+    /// A choice: both branches have to have the same constant at rest, unless the condition is decided there.
+    fn select(&mut self, s: Symbol, parts: [&Expr; 4]) -> Result<Split, SplitError> {
+        let [left, right, then, otherwise] = parts;
+        let condition = self.split(&(left.clone() - right.clone()))?;
+        let (then_, otherwise_) = (self.split(then)?, self.split(otherwise)?);
+        let threshold = self.simplify(Expr::int(-1) * condition.rest.clone())?;
+        let difference = self.simplify(then_.rest.clone() - otherwise_.rest.clone())?;
+        let name = self.quantities.get(s).name.clone();
+        // At rest the condition compares 0 with the threshold.
+        let decided = self.rest.constants.is_positive(self.quantities, &threshold).map(|positive| !positive);
+        let (rest, then_change, otherwise_change) = if difference.is_zero() {
+            (then_.rest.clone(), then_.change.clone(), otherwise_.change.clone())
+        } else {
+            match decided {
+                Some(true) => (then_.rest.clone(), then_.change.clone(), otherwise_.value.clone() - then_.rest.clone()),
+                Some(false) => {
+                    (otherwise_.rest.clone(), then_.value.clone() - otherwise_.rest.clone(), otherwise_.change.clone())
+                }
+                None => {
+                    return self.refuse(
+                        &s.into(),
+                        "jumps at rest: its branches differ there, and which one counts is open",
+                        "let the branches agree where the condition changes",
+                    );
+                }
+            }
+        };
+        let rewritten =
+            (condition.rewritten.0 || !condition.rest.is_zero() || then_.rewritten.0 || otherwise_.rewritten.0, false);
+        let choose = |splitter: &mut Self, name: String, then: Expr, otherwise: Expr| -> Expr {
+            if then == otherwise {
+                return then;
+            }
+            let value = Value::Select { left: condition.change.clone(), right: threshold.clone(), then, otherwise };
+            splitter.quantities.add(name, Kind::Stage { value, partials: None }).into()
+        };
+        let second = match (then_.second, otherwise_.second) {
+            (Some(a), Some(b)) if difference.is_zero() && a.linear == b.linear => {
+                let remainder = choose(self, format!("{name}_remainder"), a.remainder, b.remainder);
+                let order = a.order.min(b.order);
+                Some(Second { linear: a.linear, remainder, order, is_whole: a.is_whole && b.is_whole })
+            }
+            (Some(a), Some(b)) => {
+                // A decided condition takes one branch in a neighbourhood of rest.
+                let taken = match decided {
+                    Some(true) => Some(a),
+                    Some(false) => Some(b),
+                    None => None,
+                };
+                match taken {
+                    Some(near) => {
+                        let linear = near.linear.clone();
+                        let form = near.linear_form();
+                        let then = then_change.clone() - form.clone();
+                        let otherwise = otherwise_change.clone() - form;
+                        let (then, otherwise) = match decided {
+                            Some(true) => (near.remainder.clone(), otherwise),
+                            _ => (then, near.remainder.clone()),
+                        };
+                        let remainder = choose(self, format!("{name}_remainder"), then, otherwise);
+                        Some(Second { linear, remainder, order: near.order, is_whole: false })
+                    }
+                    None => {
+                        let change =
+                            choose(self, format!("{name}_change"), then_change.clone(), otherwise_change.clone());
+                        Some(Second::of_first_order(change))
+                    }
+                }
+            }
+            _ => None,
+        };
+        let change = choose(self, format!("{name}_change"), then_change, otherwise_change);
+        let value = rest.clone() + change.clone();
+        Ok(Split { rest, change, value, rewritten, second })
+    }
+}
+
+/// The sum of terms, without those that are 0.
+fn total(terms: impl Iterator<Item = Expr>) -> Expr {
+    let mut flat = Vec::new();
+    for t in terms {
+        match t {
+            Expr::Sum(xs) => flat.extend(xs),
+            t if t.is_zero() => {}
+            t => flat.push(t),
+        }
+    }
+    match flat.len() {
+        0 => Expr::int(0),
+        1 => flat.remove(0),
+        _ => Expr::Sum(flat),
+    }
+}
