@@ -116,7 +116,7 @@ fn check_law(law: &LawEntry, ir: &Derivation, seed: u64) {
         // Near rest, and far from it.
         (
             Input::DisplacementGradient,
-            single(&if seed % 3 == 0 { rng.gradient(0.1, 10.0) } else { rng.gradient(0.5, 2.0) }),
+            single(&if seed.is_multiple_of(3) { rng.gradient(0.1, 10.0) } else { rng.gradient(0.5, 2.0) }),
         ),
         (Input::GradientIncrement, single(&rng.direction())),
         (Input::NodeGradient, single(&rng.direction()[..3])),
