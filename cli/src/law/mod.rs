@@ -1,6 +1,8 @@
 //! `tensormass law`: the laws of this build, and derivations of law files.
 
+mod bench;
 mod derive;
+mod extremes;
 mod list;
 mod show;
 
@@ -15,6 +17,8 @@ pub enum Command {
     List(list::Arguments),
     /// Show one law: source, parameters, domain, structure and the operations of its kernels.
     Show(show::Arguments),
+    /// Measure how accurate a law's kernels are, from strains of 1e-8 to 10, turned and nearly incompressible.
+    Extremes(extremes::Arguments),
     /// Differentiate a law and write its derivation. `cargo xtask law accept` calls this.
     #[command(hide = true)]
     Derive(derive::Arguments),
@@ -28,6 +32,7 @@ pub fn call(command: Command) -> Result<(), Failure> {
     match command {
         Command::List(arguments) => list::call(&arguments),
         Command::Show(arguments) => show::call(&arguments),
+        Command::Extremes(arguments) => extremes::call(&arguments),
         Command::Derive(arguments) => derive::call(&arguments),
     }
 }
