@@ -363,6 +363,8 @@ impl Extremes {
 
     /// A material for the reader: `nu = 0.3`.
     pub fn label(&self, material: usize) -> String {
-        format!("nu = {:.4}", self.materials[material].moduli.poisson())
+        // Adding 0 makes a positive zero of a negative one.
+        let poisson = (self.materials[material].moduli.poisson() * 1e4).round() / 1e4 + 0.0;
+        format!("nu = {poisson:.4}")
     }
 }

@@ -8,11 +8,15 @@
 //! in f32, f64 and 448 bits ([`evaluate`], [`number`]), which performs the operations of the printed Rust, and by running
 //! its WGSL on an adapter ([`wgsl`]).
 
+pub mod check;
 pub mod csv;
+mod edge;
 pub mod evaluate;
+mod exact;
 pub mod extremes;
 pub mod gate;
 pub mod heat_map;
+mod identities;
 mod lanes;
 pub mod material;
 pub mod number;
