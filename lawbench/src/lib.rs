@@ -10,9 +10,12 @@
 
 pub mod check;
 pub mod csv;
+pub mod curve;
+pub mod drive;
 mod edge;
 pub mod evaluate;
 mod exact;
+pub mod explain;
 pub mod extremes;
 pub mod gate;
 pub mod heat_map;

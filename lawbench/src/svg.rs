@@ -48,6 +48,16 @@ impl Drawing {
         );
     }
 
+    /// A line through points.
+    pub fn line(&mut self, points: &[[f64; 2]], stroke: &str, width: f64) {
+        let points: Vec<String> = points.iter().map(|[x, y]| format!("{x:.2},{y:.2}")).collect();
+        let points = points.join(" ");
+        let _ = writeln!(
+            self.body,
+            "<polyline points=\"{points}\" fill=\"none\" stroke=\"{stroke}\" stroke-width=\"{width}\"/>"
+        );
+    }
+
     /// The document.
     pub fn finish(self) -> String {
         let Self { width, height, body } = self;
