@@ -142,11 +142,22 @@ impl<R: Real> BatchKernels<R> {
     }
 }
 
+/// The texts that a law was printed from, for programs that examine laws.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LawSource {
+    /// The law file.
+    pub law: &'static str,
+    /// Its derivation, as `laws/derived/` holds derivations.
+    pub derivation: &'static str,
+}
+
 /// A law of this build: metadata and entry points. Laws are data: nothing else names them.
 #[derive(Debug, Clone, Copy)]
 pub struct LawEntry {
     /// What the law is.
     pub info: &'static LawInfo,
+    /// What it was printed from.
+    pub source: &'static LawSource,
     /// [`Law::material`].
     pub material: fn(&[f64], &mut [f64]),
     /// Batched kernels in single precision.
@@ -159,9 +170,9 @@ pub struct LawEntry {
 
 impl LawEntry {
     /// The entry of a law.
-    pub const fn new<L: Law>(info: &'static LawInfo, shaders: &'static LawShaders) -> Self {
+    pub const fn new<L: Law>(info: &'static LawInfo, source: &'static LawSource, shaders: &'static LawShaders) -> Self {
         let (f32, f64) = (BatchKernels::<f32>::of::<L>, BatchKernels::<f64>::of::<L>);
-        Self { info, material: L::material, f32, f64, shaders }
+        Self { info, source, material: L::material, f32, f64, shaders }
     }
 
     /// The constants of a material, checked for length only.

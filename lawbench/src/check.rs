@@ -1,0 +1,235 @@
+//! Whether a law is what a hyperelastic law should be: named findings with their numbers.
+
+use serde::Serialize;
+use tensormass_codegen::ir::Number;
+
+use crate::edge::edge;
+use crate::exact::{ExactLaw, exact};
+use crate::extremes::{ExtremesError, Options, extremes};
+use crate::identities::{At, DIFFERENCE, IDENTITY};
+use crate::material::{Material, is_direction};
+use crate::number::Exact;
+use crate::states::{ROTATIONS, Random, STRAINS};
+use crate::subject::Subject;
+use crate::wgsl::Device;
+
+/// How a finding counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// As it should be.
+    Passed,
+    /// Not as it should be.
+    Failed,
+    /// For the reader to know.
+    Noted,
+}
+
+/// One thing that was examined.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// What.
+    pub name: &'static str,
+    /// How it counts.
+    pub verdict: Verdict,
+    /// The numbers.
+    pub detail: String,
+}
+
+/// The findings of a law.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// The law.
+    pub law: String,
+    /// The parameter sets that it was examined at.
+    pub materials: Vec<Material>,
+    /// In the order in which they were made.
+    pub findings: Vec<Finding>,
+}
+
+impl Report {
+    /// The names of what failed.
+    pub fn failed(&self) -> Vec<&'static str> {
+        self.findings.iter().filter(|f| f.verdict == Verdict::Failed).map(|f| f.name).collect()
+    }
+}
+
+fn finding(name: &'static str, passed: bool, detail: String) -> Finding {
+    Finding { name, verdict: if passed { Verdict::Passed } else { Verdict::Failed }, detail }
+}
+
+fn note(name: &'static str, detail: String) -> Finding {
+    Finding { name, verdict: Verdict::Noted, detail }
+}
+
+/// Rotations at which identities are tried: none, a small and a large one.
+const TURNS: [usize; 3] = [0, 2, 4];
+
+/// Examines a law. `options.samples` are those of the precision's measurement.
+///
+/// # Errors
+/// See [`ExtremesError`].
+pub fn check(subject: &Subject, options: Options, device: Result<&Device, String>) -> Result<Report, ExtremesError> {
+    let materials = Material::all(subject)?;
+    let mut findings = vec![];
+    let rest = exact(&[0.0; 9]);
+    let stress = materials.iter().map(|m| {
+        let law = ExactLaw::new(&subject.derivation, m);
+        Exact::norm(&law.stress(&rest)).div(&Exact::norm(law.tangent(&rest).as_flattened())).to_f64()
+    });
+    let stress = stress.fold(0.0, f64::max);
+    let detail = format!("|P(0)| is {stress:.1e} of the stiffness, exactly evaluated");
+    findings.push(finding("no stress at rest", stress <= IDENTITY, detail));
+    for material in &materials {
+        let m = material.moduli;
+        let young = 9.0 * m.bulk * m.shear / (3.0 * m.bulk + m.shear);
+        let detail = format!("mu = {:.6e}, K = {:.6e}, E = {young:.6e}, nu = {:.6}", m.shear, m.bulk, m.poisson());
+        findings.push(note("small-strain moduli", detail));
+    }
+    findings.push(stability(subject, &materials));
+    findings.extend(identities(subject, &materials, options.seed));
+    findings.push(domain(subject, &materials, options.seed));
+    findings.push(precision(subject, options, device)?);
+    Ok(Report { law: subject.name().to_string(), materials, findings })
+}
+
+/// The least eigenvalue of the tangent at rest, over symmetric strains.
+fn stability(subject: &Subject, materials: &[Material]) -> Finding {
+    let least = materials.iter().map(|material| {
+        let tangent = ExactLaw::new(&subject.derivation, material).tangent(&exact(&[0.0; 9]));
+        let half = 0.5f64.sqrt();
+        // An orthonormal basis of symmetric matrices: three normal strains, three shears.
+        let basis: [[f64; 9]; 6] = std::array::from_fn(|b| {
+            let mut e = [0.0; 9];
+            match b {
+                0..3 => e[4 * b] = 1.0,
+                _ => {
+                    let (i, j) = [(1, 2), (0, 2), (0, 1)][b - 3];
+                    (e[3 * i + j], e[3 * j + i]) = (half, half);
+                }
+            }
+            e
+        });
+        let entry = |a: usize, b: usize| -> f64 {
+            let pairs = (0..81).map(|k| basis[a][k / 9] * tangent[k / 9][k % 9].to_f64() * basis[b][k % 9]);
+            pairs.sum()
+        };
+        let eigenvalues = nalgebra::SMatrix::<f64, 6, 6>::from_fn(entry).symmetric_eigenvalues();
+        eigenvalues.min() / material.moduli.shear
+    });
+    let least = least.fold(f64::INFINITY, f64::min);
+    let detail = format!("the least eigenvalue of the tangent over symmetric strains is {least:.4} mu");
+    finding("positive definite at rest", least > 0.0, detail)
+}
+
+/// An identity: its name, how far it is from holding at a state, and how far it may be.
+type Identity = (&'static str, fn(&At) -> f64, f64);
+
+const IDENTITIES: [Identity; 5] = [
+    ("force is the derivative of energy", |at| at.energy_and_force(), DIFFERENCE),
+    ("dforce is the derivative of force", |at| at.force_and_dforce(), DIFFERENCE),
+    ("symmetric tangent", |at| at.symmetry(), IDENTITY),
+    ("diagonal and Cauchy stress agree with tangent and stress", |at| at.other_kernels(), IDENTITY),
+    ("printed kernels are the textbook form", |at| at.forms(), IDENTITY),
+];
+
+fn identities(subject: &Subject, materials: &[Material], seed: u64) -> Vec<Finding> {
+    let laws: Vec<ExactLaw> = materials.iter().map(|m| ExactLaw::new(&subject.derivation, m)).collect();
+    let mut states = vec![];
+    for (m, law) in laws.iter().enumerate() {
+        for (s, strain) in STRAINS.iter().enumerate() {
+            for (k, r) in TURNS.iter().enumerate() {
+                let mut random = Random::new(&[seed, 1, m as u64, s as u64, *r as u64]);
+                let g = exact(&random.gradient(*strain, ROTATIONS[*r], s + k));
+                if law.inside(&g) {
+                    states.push(At::new(law, g, &mut random));
+                }
+            }
+        }
+    }
+    let worst = |f: fn(&At) -> f64| {
+        // NaN is as bad as can be.
+        states.iter().map(f).map(|x| if x.is_nan() { f64::INFINITY } else { x }).fold(0.0, f64::max)
+    };
+    let detail = |worst: f64, allowed: f64| format!("{worst:.1e} at {} states, {allowed:.0e} is allowed", states.len());
+    let mut findings: Vec<Finding> = IDENTITIES
+        .iter()
+        .map(|(name, f, allowed)| {
+            let worst = worst(*f);
+            finding(name, !states.is_empty() && worst <= *allowed, detail(worst, *allowed))
+        })
+        .collect();
+    let (objectivity, isotropy) = (worst(|at| at.objectivity()), worst(|at| at.isotropy()));
+    // A law of small strains changes under rotation, and says so by the strain that it takes.
+    findings.push(if objectivity > IDENTITY && subject.law.text.contains(".eps") {
+        note(
+            "objective",
+            format!("no, as every law of the small strain: {objectivity:.1e} of the stress under rotations"),
+        )
+    } else {
+        finding("objective", objectivity <= IDENTITY, detail(objectivity, IDENTITY))
+    });
+    let small_strain = objectivity > IDENTITY;
+    findings.push(if isotropy <= IDENTITY {
+        finding("isotropic", true, detail(isotropy, IDENTITY))
+    } else if small_strain || subject.law.parameters.iter().any(is_direction) {
+        note("isotropic", format!("no: {isotropy:.1e} of the stress under rotations of the body at rest"))
+    } else {
+        finding("isotropic", false, detail(isotropy, IDENTITY))
+    });
+    findings
+}
+
+fn domain(subject: &Subject, materials: &[Material], seed: u64) -> Finding {
+    let name = "edge of the domain";
+    let Some(domain) = &subject.law.domain else { return note(name, "the law holds everywhere".into()) };
+    let edges: Vec<_> = materials
+        .iter()
+        .enumerate()
+        .map(|(m, material)| edge(&subject.derivation, material, &mut Random::new(&[seed, 2, m as u64])))
+        .collect();
+    let reached: usize = edges.iter().map(|e| e.reached).sum();
+    let faults: Vec<&String> = edges.iter().flat_map(|e| &e.faults).collect();
+    match faults.first() {
+        _ if reached == 0 => note(name, format!("{}: no ray from rest comes to it", domain.text)),
+        Some(first) => finding(name, false, format!("{}: {} faults, first {first}", domain.text, faults.len())),
+        None => {
+            let detail =
+                format!("{}: the margin changes sign on {reached} rays, values before it are finite", domain.text);
+            finding(name, true, detail)
+        }
+    }
+}
+
+fn precision(subject: &Subject, options: Options, device: Result<&Device, String>) -> Result<Finding, ExtremesError> {
+    let measured = extremes(subject, options, device)?;
+    let failures = measured.failures();
+    let machines: Vec<String> = measured
+        .worst()
+        .iter()
+        .map(|c| format!("{} in {} {:.2}", c.quantity.name(), c.machine.name(), c.gate))
+        .collect();
+    let detail = match failures.first() {
+        Some(first) => format!("{first} ({} above the gate; `law extremes` shows all)", failures.len()),
+        None => format!("worst parts of the bounds: {}", machines.join(", ")),
+    };
+    Ok(finding("accurate in f32, f64 and WGSL", failures.is_empty(), detail))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What has to hold of every law, however its kernels round.
+    #[test]
+    fn laws_of_this_build_are_hyperelastic() {
+        for entry in tensormass_kernels::laws() {
+            let subject = Subject::of_build(entry);
+            let options = Options { samples: 1, seed: 3 };
+            let report = check(&subject, options, Err("not asked for".into())).expect("a material");
+            let failed: Vec<_> = report.failed().into_iter().filter(|name| !name.starts_with("accurate")).collect();
+            assert!(failed.is_empty(), "{}: {:?}", entry.info.name, report.findings);
+            assert_eq!(report.findings.len() - report.materials.len(), 11, "every finding is made, once");
+        }
+    }
+}
