@@ -3,7 +3,7 @@
 //! This is the one place that knows which kernel's values count.
 
 use tensormass_codegen::derivation::Derivation;
-use tensormass_codegen::ir::{Input, Number, Output, ValidKernel};
+use tensormass_codegen::ir::{Input, Number, Output};
 
 /// What a point kernel gives.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,23 +28,25 @@ pub fn constants<T: Number>(derivation: &Derivation, parameters: &[T]) -> Vec<T>
 /// # Panics
 /// An input is missing or has another length than the kernel's.
 pub fn printed<T: Number>(derivation: &Derivation, kernel: &str, inputs: &[(Input, &[T])]) -> Values<T> {
-    interpret(derivation.kernel(kernel), inputs)
+    let point = derivation.point(kernel);
+    let roles = point.outputs().map(|(role, _)| *role).collect();
+    values(roles, point.interpret(inputs).expect("the inputs of a point kernel"))
 }
 
-/// The value of the law as its file writes it: of the kernel's unsplit form, `NAME_far`, where it has one, and of its
-/// only form otherwise. In a number type of many digits this is the exact value.
+/// The value of the law as its file writes it: of the kernel's unsplit form where it has one, and of its only form
+/// otherwise. In a number type of many digits this is the exact value.
 ///
 /// # Panics
 /// See [`printed`].
 pub fn textbook<T: Number>(derivation: &Derivation, kernel: &str, inputs: &[(Input, &[T])]) -> Values<T> {
-    let far = format!("{kernel}_far");
-    let unsplit = derivation.kernels.iter().find(|k| k.ir().name == far);
-    interpret(unsplit.unwrap_or_else(|| derivation.kernel(kernel)), inputs)
+    let point = derivation.point(kernel);
+    let textbook = point.textbook();
+    let roles = textbook.ir().outputs.iter().map(|(role, _)| *role).collect();
+    values(roles, textbook.interpret(inputs).expect("the inputs of a point kernel"))
 }
 
-fn interpret<T: Number>(kernel: &ValidKernel, inputs: &[(Input, &[T])]) -> Values<T> {
-    let mut arrays = kernel.interpret(inputs).expect("the inputs of a point kernel");
-    let margin = kernel.ir().outputs.iter().position(|(role, _)| *role == Output::DomainMargin);
+fn values<T: Clone>(roles: Vec<Output>, mut arrays: Vec<Vec<T>>) -> Values<T> {
+    let margin = roles.iter().position(|role| *role == Output::DomainMargin);
     let margin = margin.map(|at| arrays[at][0].clone());
     Values { value: arrays.swap_remove(0), margin }
 }
@@ -52,33 +54,40 @@ fn interpret<T: Number>(kernel: &ValidKernel, inputs: &[(Input, &[T])]) -> Value
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tensormass_codegen::ir::{KernelIr, Op};
+    use tensormass_codegen::ir::{Builder, Rational};
 
-    /// The derivation of a law of this build whose margin is J, with a form `force_far` that has a stress of its own.
+    /// A derivation whose force is 1 near rest, where G00 < 1/2, and 2 elsewhere.
     fn split() -> Derivation {
-        let entry = tensormass_kernels::laws().iter().find(|l| l.info.domain.is_some()).expect("a law with a domain");
+        let entry = tensormass_kernels::laws().first().expect("a law");
         let mut derivation = Derivation::from_text(entry.source.derivation).expect("a derivation");
         derivation.kernels.retain(|k| !k.ir().name.ends_with("_far"));
-        let plain = derivation.kernel("force").ir();
-        // The margin in the place of every stress component.
-        let margin = plain.outputs[1].1[0];
-        let outputs = vec![(Output::Stress, vec![margin; 9]), plain.outputs[1].clone()];
-        let values = plain.values[..=margin.index()].to_vec();
-        let far = KernelIr { name: "force_far".into(), outputs, values, inputs: plain.inputs.clone() };
-        derivation.kernels.push(far.validate().expect("a part of a valid kernel"));
+        let at = derivation.kernels.iter().position(|k| k.ir().name == "force").expect("every law has a force");
+        let inputs = derivation.kernels[at].ir().inputs.clone();
+        let form = |name: &str, value: i128, holds: bool| {
+            let mut b = Builder::new();
+            let stress = b.number(value.into());
+            let mut outputs = vec![(Output::Stress, vec![stress; 9])];
+            if holds {
+                let (half, g) = (b.number(Rational::new(1, 2)), b.input(Input::DisplacementGradient, 0));
+                outputs.push((Output::NearRest, vec![b.sub(half, g)]));
+            }
+            b.finish(name, inputs.clone(), outputs).validate().expect("a valid kernel")
+        };
+        derivation.kernels[at] = form("force", 1, true);
+        derivation.kernels.insert(at + 1, form("force_far", 2, false));
         derivation
     }
 
     #[test]
-    fn the_unsplit_form_is_the_textbook_s() {
+    fn near_rest_the_split_form_counts_and_the_textbook_is_the_other() {
         let derivation = split();
         let count = derivation.kernel("force").ir().inputs.iter().find(|(r, _)| *r == Input::Constants);
         let constants = vec![1.0; count.expect("a force has constants").1 as usize];
-        let rest = [0.0; 9];
-        let inputs = [(Input::Constants, constants.as_slice()), (Input::DisplacementGradient, &rest[..])];
-        let textbook = textbook(&derivation, "force", &inputs);
-        assert_eq!(textbook, Values { value: vec![1.0; 9], margin: Some(1.0) });
-        assert_ne!(printed(&derivation, "force", &inputs).value, textbook.value);
-        assert!(derivation.kernel("force").ir().values.iter().any(|d| matches!(d.op, Op::Add(..))));
+        for (g, expected) in [(0.0, 1.0), (0.75, 2.0)] {
+            let g = [g; 9];
+            let inputs = [(Input::Constants, constants.as_slice()), (Input::DisplacementGradient, &g[..])];
+            assert_eq!(printed(&derivation, "force", &inputs), Values { value: vec![expected; 9], margin: None });
+            assert_eq!(textbook(&derivation, "force", &inputs).value, [2.0; 9]);
+        }
     }
 }

@@ -1,4 +1,5 @@
-//! A derivation for the reader: the material's constants, and the named stages of each kernel as formulas.
+//! A derivation for the reader: the material's constants, what was rewritten for the sake of accuracy at rest, and the
+//! named stages of each kernel as formulas.
 
 use tensormass_codegen::derivation::Derivation;
 use tensormass_codegen::ir::{Input, Op, ValidKernel, ValueId};
@@ -12,6 +13,8 @@ pub fn page(derivation: &Derivation) -> String {
     for (k, constant) in derivation.constants.iter().enumerate() {
         page += &format!("  c{k} = {constant}\n");
     }
+    page += &format!("\nW at rest, which is subtracted\n  {}\n", derivation.energy_at_rest);
+    page += &rewrites(derivation);
     for kernel in derivation.kernels.iter().filter(|k| k.ir().name != "material") {
         page += &format!("\n{}: {} operations\n", kernel.ir().name, kernel.count().arithmetic());
         for (name, formula) in stages(kernel) {
@@ -19,6 +22,21 @@ pub fn page(derivation: &Derivation) -> String {
         }
     }
     page
+}
+
+/// Each rewrite: the term as the law file has it, its exact constant at rest, and what is computed instead.
+fn rewrites(derivation: &Derivation) -> String {
+    let mut page = String::new();
+    let mut kernel = "";
+    for r in &derivation.rewrites {
+        if r.kernel != kernel {
+            kernel = &r.kernel;
+            let what = if kernel == "energy" { "constant and linear part" } else { "constant" };
+            page += &format!("\n{kernel}, split at rest: term -> {what} at rest, and what is computed of it\n");
+        }
+        page += &format!("  {}\n    -> {}\n     + {}\n", r.term, r.rest, r.form);
+    }
+    if page.is_empty() { "\nnothing cancels at rest: no term is rewritten\n".into() } else { page }
 }
 
 /// The named values of a kernel, in order, in terms of inputs and of names before them.
@@ -81,6 +99,8 @@ fn formula(op: &Op, texts: &[(String, u8)]) -> (String, u8) {
         Op::Exp(a) => call("exp", &[a]),
         Op::Log1p(a) => call("log1p", &[a]),
         Op::Expm1(a) => call("expm1", &[a]),
+        Op::Log1pmx(a) => call("log1pmx", &[a]),
+        Op::Expm1mx(a) => call("expm1mx", &[a]),
         Op::Select(l, r, a, b) => {
             let [l, r, a, b] = [l, r, a, b].map(|v| at(v, SUM));
             (format!("({a} where {l} > {r}, else {b})"), ATOM)

@@ -73,6 +73,12 @@ impl Number for Lanes {
     fn expm1(&self) -> Self {
         self.one(Exact::expm1)
     }
+    fn log1pmx(&self) -> Self {
+        self.one(Exact::log1pmx)
+    }
+    fn expm1mx(&self) -> Self {
+        self.one(Exact::expm1mx)
+    }
     fn powf(&self, b: &Self) -> Self {
         self.two(b, Exact::powf)
     }

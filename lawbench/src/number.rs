@@ -131,6 +131,12 @@ impl Number for Exact {
     fn expm1(&self) -> Self {
         self.exp().sub(&Self::from(1.0))
     }
+    fn log1pmx(&self) -> Self {
+        self.sub(&self.log1p())
+    }
+    fn expm1mx(&self) -> Self {
+        self.expm1().sub(self)
+    }
     fn powf(&self, b: &Self) -> Self {
         with_constants(|c| self.0.pow(&b.0, BITS, ROUNDING, c))
     }
