@@ -1,6 +1,7 @@
 //! Hooke's law: linear elasticity of small strains, W = lambda/2 tr(eps)^2 + mu eps:eps.
 //! Faure, Zara, Jaillet & Moreau, An Implicit Tensor-Mass Solver on the GPU for Soft Bodies Simulation, VRIPHYS 2012,
 //! eq. 9.
+#[small_strain]
 struct Parameters {
     /// Young's modulus.
     #[unit("Pa")] #[range(1e0, 1e12)] young: f64,

@@ -50,7 +50,7 @@ impl Case {
 
     /// The law is invariant under rotations of the deformed body; the small strain is not.
     fn objective(&self) -> bool {
-        !self.point.entry.info.structure.linear
+        !self.point.entry.info.small_strain
     }
 }
 

@@ -7,8 +7,8 @@ use serde_json::Value;
 use tensormass_codegen::derivation::{self, Derivation};
 
 /// A law that this workspace does not build in, and its reviewed derivation.
-const MOONEY_RIVLIN: &str = include_str!("../../examples/custom-law/laws/mooney_rivlin.rs");
-const MOONEY_RIVLIN_DERIVED: &str = include_str!("../../examples/custom-law/laws/derived/mooney_rivlin.ir");
+const GENT: &str = include_str!("../../examples/custom-law/laws/gent.rs");
+const GENT_DERIVED: &str = include_str!("../../examples/custom-law/laws/derived/gent.ir");
 
 fn root() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
@@ -145,16 +145,16 @@ fn an_unknown_law_is_refused_with_a_suggestion_and_the_list() {
 
 #[test]
 fn a_new_law_file_is_derived() {
-    let (folder, path) = law_file("mooney_rivlin.rs", MOONEY_RIVLIN);
+    let (folder, path) = law_file("gent.rs", GENT);
     let out = folder.path().join("new/derived");
     let said = succeed(&["law", "derive", utf8(&path), "--out", utf8(&out)]);
-    let written = std::fs::read_to_string(out.join("mooney_rivlin.ir")).expect("the derivation");
-    assert!(said.contains("mooney_rivlin.ir"), "{said}");
+    let written = std::fs::read_to_string(out.join("gent.ir")).expect("the derivation");
+    assert!(said.contains("gent.ir"), "{said}");
     let derivation = Derivation::from_text(&written).expect("a derivation");
-    assert_eq!((derivation.law.as_str(), derivation.hash), ("mooney_rivlin", derivation::hash(MOONEY_RIVLIN)));
-    assert_eq!(written, MOONEY_RIVLIN_DERIVED, "the committed derivation of examples/custom-law is not a fresh one");
+    assert_eq!((derivation.law.as_str(), derivation.hash), ("gent", derivation::hash(GENT)));
+    assert_eq!(written, GENT_DERIVED, "the committed derivation of examples/custom-law is not a fresh one");
     let left: Vec<_> = std::fs::read_dir(&out).expect("readable").map(|e| e.expect("an entry").file_name()).collect();
-    assert_eq!(left, ["mooney_rivlin.ir"]);
+    assert_eq!(left, ["gent.ir"]);
 }
 
 #[test]
@@ -168,7 +168,7 @@ fn a_law_is_derived_by_name() {
 /// A process that lets the next one start a moment too early makes it abort now and then: many rounds show it.
 #[test]
 fn derivations_at_once_wait_for_each_other() {
-    let (folder, path) = law_file("mooney_rivlin.rs", MOONEY_RIVLIN);
+    let (folder, path) = law_file("gent.rs", GENT);
     for _ in 0..8 {
         let outs: Vec<PathBuf> = (0..8).map(|k| folder.path().join(k.to_string())).collect();
         let start = |out: &PathBuf| {
@@ -179,14 +179,14 @@ fn derivations_at_once_wait_for_each_other() {
         for (process, out) in running.into_iter().zip(&outs) {
             let output = process.wait_with_output().expect("it ends");
             assert!(output.status.success(), "{}", stderr(&output));
-            assert_eq!(std::fs::read_to_string(out.join("mooney_rivlin.ir")).expect("written"), MOONEY_RIVLIN_DERIVED);
+            assert_eq!(std::fs::read_to_string(out.join("gent.ir")).expect("written"), GENT_DERIVED);
         }
     }
 }
 
 #[test]
 fn errors_of_a_law_file_pass_through() {
-    let wrong = MOONEY_RIVLIN.replace("s.I1bar", "s.I1ba").replace("powi(2)", "pow(2)");
+    let wrong = GENT.replace("s.I1bar", "s.I1ba").replace("powi(2)", "pow(2)");
     let (folder, path) = law_file("wrong.rs", &wrong);
     let out = folder.path().join("out");
     let errors = refused(&["law", "derive", utf8(&path), "--out", utf8(&out)]);
@@ -201,7 +201,7 @@ fn errors_of_a_law_file_pass_through() {
 
 #[test]
 fn files_that_cannot_be_read_or_written_are_bad_input() {
-    let (folder, path) = law_file("mooney_rivlin.rs", MOONEY_RIVLIN);
+    let (folder, path) = law_file("gent.rs", GENT);
     let missing = folder.path().join("missing.rs");
     assert!(refused(&["law", "derive", utf8(&missing), "--out", "target"]).contains(utf8(&missing)));
     // A file where the folder should be.

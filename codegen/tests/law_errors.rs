@@ -2,7 +2,7 @@
 //!
 //! The cases are the files of `law_errors/`: `==== KIND`, a text, `----`, the message. KIND says what the text is:
 //! a `file`, a file but for its doc comment (`documented`), the functions and constants below the struct (`items`),
-//! or the body of the energy (`energy`).
+//! or the body of the energy, of one parameter mu (`energy`) or of mu, kappa and n (`moduli`). With UPDATE=1 the messages are written instead of compared, for review.
 
 use std::path::{Path, PathBuf};
 
@@ -10,6 +10,9 @@ use tensormass_codegen::law::{LawError, parse};
 
 const DOCS: &str = "//! Test law.\n";
 const STRUCT: &str = "struct Parameters {\n    /// Stiffness.\n    #[unit(\"Pa\")] #[range(0.0, 1e9)] mu: f64,\n}\n";
+const MODULI: &str = "struct Parameters {\n    /// Shear modulus.\n    #[unit(\"Pa\")] #[range(0.0, 1e9)] mu: f64,\n    \
+                      /// Bulk modulus.\n    #[unit(\"Pa\")] #[range(0.0, 1e9)] kappa: f64,\n    \
+                      /// A pure number.\n    #[unit(\"1\")] #[range(1.0, 2.0)] n: f64,\n}\n";
 const SIGNATURE: &str = "fn energy_density(s: Strain, p: Parameters) -> f64 {\n    ";
 
 fn folder(name: &str) -> PathBuf {
@@ -32,36 +35,47 @@ fn message(errors: &[LawError]) -> String {
     errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
 }
 
-/// The law file `text` is refused with exactly `expected`.
-fn check(text: &str, expected: &str) {
-    match parse("laws/test.rs", text) {
-        Ok(_) => panic!("accepted:\n{text}"),
-        Err(errors) => {
-            let found = message(&errors);
-            assert_eq!(found, expected, "\nfound:\n{found}\n\nexpected:\n{expected}\n\nfor:\n{text}");
-        }
+/// What the law file `text` is refused with.
+fn refusal(text: &str) -> String {
+    message(&parse("laws/test.rs", text).err().unwrap_or_else(|| panic!("accepted:\n{text}")))
+}
+
+/// Every case of a file `text` is refused with exactly its message. Returns the file with the messages found, and the
+/// number of cases.
+fn check(name: &str, text: &str, update: bool) -> (String, usize) {
+    let (mut written, mut cases) = (String::new(), 0);
+    for case in format!("\n{text}").split("\n==== ").skip(1) {
+        let (kind, case) = case.split_once('\n').expect("a kind, then a text");
+        let (text, expected) = case.split_once("\n----\n").expect("a text, ----, a message");
+        let file = match kind {
+            "file" => text.to_owned(),
+            "documented" => format!("{DOCS}{text}"),
+            "items" => format!("{DOCS}{STRUCT}{text}"),
+            "energy" => format!("{DOCS}{STRUCT}{SIGNATURE}{text}\n}}\n"),
+            "moduli" => format!("{DOCS}{MODULI}{SIGNATURE}{text}\n}}\n"),
+            _ => panic!("{name}: unknown kind {kind}"),
+        };
+        let (found, expected) = (refusal(&file), expected.trim_end());
+        assert!(update || found == expected, "\nfound:\n{found}\n\nexpected:\n{expected}\n\nfor:\n{file}");
+        written += &format!("{}==== {kind}\n{text}\n----\n{found}\n", if cases == 0 { "" } else { "\n" });
+        cases += 1;
     }
+    (written, cases)
 }
 
 #[test]
 fn every_wrong_file_has_its_message() {
+    let update = std::env::var_os("UPDATE").is_some();
     let mut cases = 0;
     for (name, text) in texts(&folder("tests/law_errors"), "txt") {
-        for case in format!("\n{text}").split("\n==== ").skip(1) {
-            let (kind, case) = case.split_once('\n').expect("a kind, then a text");
-            let (text, expected) = case.split_once("\n----\n").expect("a text, ----, a message");
-            let text = match kind {
-                "file" => text.to_owned(),
-                "documented" => format!("{DOCS}{text}"),
-                "items" => format!("{DOCS}{STRUCT}{text}"),
-                "energy" => format!("{DOCS}{STRUCT}{SIGNATURE}{text}\n}}\n"),
-                _ => panic!("{name}: unknown kind {kind}"),
-            };
-            check(&text, expected.trim_end());
-            cases += 1;
+        let (written, count) = check(&name, &text, update);
+        cases += count;
+        if written != text {
+            assert!(update, "{name} has another layout than UPDATE=1 writes");
+            std::fs::write(&name, written).expect("written");
         }
     }
-    assert!(cases > 150, "only {cases} cases were found");
+    assert!(cases > 230, "only {cases} cases were found");
 }
 
 #[test]
@@ -148,14 +162,15 @@ fn mutated_laws_never_panic() {
         "energy_density",
         "as",
     ];
-    // A file that uses all of the language, beside the shipped ones, which use little of it.
-    let full = "//! All.\n#[domain(ln(J) * a > -a / 2.0)]\nstruct Parameters {\n/// A.\n#[unit(\"N m^-2\")] #[range(-0.5, 1e0)] \
+    // A file that uses all of the language, beside a shipped one, which uses little of it.
+    let full = "//! All.\n#[domain(ln(J) > -c[0] / 2.0)]\n#[small_strain]\nstruct Parameters {\n/// A.\n#[unit(\"N m^-2\")] #[range(-0.5, 1e0)] \
                 #[default(0.25)] #[per_element] a: f64,\n/// C.\n#[unit(\"1\")] #[range(0.0, 1.0)] c: [f64; 2],\n}\n\
-                const N: usize = 2;\nconst H: f64 = 1.0 / 2.0;\nfn f(x: f64, s: Strain) -> f64 { let y: f64 = x * H; y + s.J }\n\
+                const N: usize = 2;\nconst H: f64 = 1.0 / 2.0;\nfn f(x: f64, s: Strain) -> f64 { let y: f64 = x * H; y * s.J }\n\
                 fn energy_density(s: Strain, p: Parameters) -> f64 {\n\
-                let d = s.E - tr(s.E) / 3.0 * identity();\nf(p.a, s) * ddot(d, s.C) + select(s.J >= 1.0, pos(s.I1), 2.0)\n\
-                + sum(0..N, |i| p.c[i] * i as f64 * s.J.powi(i as i32 + 1)) + powf(s.I3, p.a).sqrt() }\n";
+                let d = s.E - tr(s.E) / 3.0 * identity();\nf(p.a, s) * ddot(d, s.C) + select(s.J >= 1.0, pos(s.I1) * p.a, 2.0 * p.a)\n\
+                + p.a * sum(0..N, |i| p.c[i] * i as f64 * s.J.powi(i as i32 + 1)) + p.a * powf(s.I3, p.c[1]).sqrt() * tr(s.eps) }\n";
     let mut laws = texts(&folder("../laws"), "rs");
+    laws.truncate(1);
     laws.push((String::from("full"), full.to_owned()));
     for (name, text) in &laws {
         assert!(parse("laws/test.rs", text).is_ok(), "{name}: {}", message(&parse("laws/test.rs", text).unwrap_err()));

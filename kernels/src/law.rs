@@ -95,6 +95,8 @@ pub struct LawInfo {
     pub parameters: &'static [ParameterInfo],
     /// The inequality that holds inside the law's domain; `None` is everywhere.
     pub domain: Option<&'static str>,
+    /// Whether the law is one of small strains, which changes under rotation.
+    pub small_strain: bool,
     /// The material's constants as expressions in the parameters, for the reader.
     pub constants: &'static [&'static str],
     /// Detected structure.

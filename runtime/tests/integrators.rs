@@ -186,7 +186,7 @@ fn free_fall() {
     }
 }
 
-/// The order p from three steps: |u_h - u_h/2| / |u_h/2 - u_h/4| = 2^p (1 + O(omega h)), omega h = 1/32 in the first.
+/// The order p from three steps: |u_h - u_h/2| / |u_h/2 - u_h/4| = 2^p (1 + O(omega h)), omega h = 1/64 in the first.
 #[test]
 fn order_in_time() {
     for law in laws() {
@@ -201,14 +201,14 @@ fn order_in_time() {
             let end = |division: u64| {
                 let mut system = one_element(law, 3);
                 system.body.mass_damping = alpha;
-                let h = critical(&mut system) / 64.0;
+                let h = critical(&mut system) / 128.0;
                 // Some 10 % of strain.
-                let speed = 0.1 / (32.0 * h);
+                let speed = 0.1 / (64.0 * h);
                 let mut state = system.initial_state([0.5 * speed, -0.3 * speed, speed]);
                 // From rest at u = 0 semi-implicit Euler would be a central difference.
                 state.u[3] = [0.05, -0.02, 0.03];
                 let mut stepper = stepper(integrator, &system);
-                advance(&mut system, &mut stepper, &mut state, h / division as f64, 96 * division);
+                advance(&mut system, &mut stepper, &mut state, h / division as f64, 192 * division);
                 state.u[3]
             };
             let (a, b, c) = (end(1), end(2), end(4));

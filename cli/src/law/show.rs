@@ -38,6 +38,7 @@ pub fn json(law: &LawInfo) -> Value {
         "reviewed": law.reviewed,
         "hash": format!("{:016x}", law.hash),
         "domain": law.domain,
+        "small_strain": law.small_strain,
         "parameters": law.parameters.iter().map(parameter_json).collect::<Value>(),
         "constants": law.constants,
         "structure": {
@@ -81,6 +82,7 @@ fn page(law: &LawInfo) -> String {
     }
     let facts = [
         ["domain", law.domain.unwrap_or("everywhere")],
+        ["small strain", if law.small_strain { "yes: rotation stresses it" } else { "no" }],
         ["linear", if law.structure.linear { "yes: dP does not depend on G" } else { "no" }],
         ["uses J", if law.structure.uses_j { "yes" } else { "no" }],
         ["polynomial", if law.structure.polynomial { "yes: P and dP are polynomials in G" } else { "no" }],

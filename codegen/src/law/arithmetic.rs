@@ -54,11 +54,20 @@ impl Lowering<'_> {
         match (&binary.op, left, right) {
             (BinOp::Add(_) | BinOp::Sub(_) | BinOp::Mul(_) | BinOp::Div(_), Value::Broken, _)
             | (BinOp::Add(_) | BinOp::Sub(_) | BinOp::Mul(_) | BinOp::Div(_), _, Value::Broken) => Value::Broken,
-            (BinOp::Add(_), Value::Scalar(a), Value::Scalar(b)) => Value::Scalar(a.add(&b)),
-            (BinOp::Sub(_), Value::Scalar(a), Value::Scalar(b)) => Value::Scalar(a.sub(&b)),
+            (BinOp::Add(_) | BinOp::Sub(_), Value::Scalar(a), Value::Scalar(b)) => {
+                let (added, first) = sum_of(&binary.op);
+                let fits = self.same(first, a.facts.dimension, b.facts.dimension, binary.right.span());
+                let sum = if added { a.add(&b) } else { a.sub(&b) };
+                Value::Scalar(if fits { sum } else { sum.of_any_dimension() })
+            }
             (BinOp::Mul(_), Value::Scalar(a), Value::Scalar(b)) => Value::Scalar(a.mul(&b)),
-            (BinOp::Add(_), Value::Tensor(a), Value::Tensor(b)) => Value::Tensor(a.combine(&b, TensorNode::Add)),
-            (BinOp::Sub(_), Value::Tensor(a), Value::Tensor(b)) => Value::Tensor(a.combine(&b, TensorNode::Sub)),
+            (BinOp::Add(_) | BinOp::Sub(_), Value::Tensor(a), Value::Tensor(b)) => {
+                let (added, first) = sum_of(&binary.op);
+                let fits = self.same(first, a.facts.dimension, b.facts.dimension, binary.right.span());
+                let mut sum = a.combine(&b, if added { TensorNode::Add } else { TensorNode::Sub });
+                sum.facts.dimension = sum.facts.dimension.filter(|_| fits);
+                Value::Tensor(sum)
+            }
             (BinOp::Mul(_), Value::Scalar(s), Value::Tensor(a))
             | (BinOp::Mul(_), Value::Tensor(a), Value::Scalar(s)) => Value::Tensor(a.scale(&s)),
             (BinOp::Mul(_), Value::Tensor(_), Value::Tensor(_)) => {
@@ -117,6 +126,7 @@ impl Lowering<'_> {
                 "change the divisor: the energy would be infinite everywhere",
             );
         }
+        self.divides(&right, binary.right.span());
         match left {
             Value::Scalar(a) => Value::Scalar(a.div(&right)),
             Value::Tensor(a) => Value::Tensor(a.scale(&ScalarValue::whole(1).div(&right))),
@@ -146,5 +156,13 @@ impl Lowering<'_> {
             Some(value) if kind != IntegerType::Usize || value >= 0 => Value::Integer(Integer { value, kind }),
             _ => self.broken(binary.op.span(), "this integer is out of range", "an index is at least 0"),
         }
+    }
+}
+
+/// Whether the operator of a sum adds, and what the first operand is to the second one.
+fn sum_of(op: &BinOp) -> (bool, &'static str) {
+    match op {
+        BinOp::Add(_) => (true, "what it is added to"),
+        _ => (false, "what it is subtracted from"),
     }
 }

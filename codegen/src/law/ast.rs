@@ -25,6 +25,8 @@ pub struct Law {
     pub parameters: Vec<Parameter>,
     /// Where the energy is defined; `None` is everywhere.
     pub domain: Option<Domain>,
+    /// Whether the energy uses the small strain, and so changes under rotation: `#[small_strain]`.
+    pub small_strain: bool,
     /// The strain energy density W, in Pa.
     pub energy: Scalar,
     /// The parts of the energy by name where the file gives several (`energy_density_isochoric`, ...); empty otherwise.

@@ -1,7 +1,5 @@
 //! Calls: built-in functions, methods of scalars, sums, and helper functions of the law file.
 
-use std::rc::Rc;
-
 use proc_macro2::Span;
 use syn::punctuated::Punctuated;
 use syn::spanned::Spanned;
@@ -10,6 +8,7 @@ use syn::{BinOp, Expr, ExprCall, ExprMethodCall, RangeLimits, Token};
 use super::ast::{ScalarNode, TensorNode};
 use super::expr::{Lowering, Scope};
 use super::functions::{ArgumentType, is_energy, plain_name};
+use super::interval::Interval;
 use super::value::{Integer, IntegerType, ScalarValue, TensorValue, Value};
 use super::words;
 
@@ -111,41 +110,50 @@ impl Lowering<'_> {
             "sum" => self.sum(arguments, scope),
             "identity" => Value::Tensor(TensorValue::leaf(TensorNode::Identity)),
             "tr" | "det" => match self.tensor(&arguments[0], scope) {
-                Some(a) if name == "tr" => {
-                    Value::Scalar(ScalarValue::over(ScalarNode::Trace(Rc::clone(&a.node)), &[a.facts]))
-                }
-                Some(a) => Value::Scalar(ScalarValue::over(ScalarNode::Det(Rc::clone(&a.node)), &[a.facts])),
+                Some(a) if name == "tr" => Value::Scalar(a.trace()),
+                Some(a) => Value::Scalar(a.det()),
                 None => Value::Broken,
             },
             "ddot" => {
                 let (a, b) = (self.tensor(&arguments[0], scope), self.tensor(&arguments[1], scope));
-                match a.zip(b) {
-                    Some((a, b)) => {
-                        let node = ScalarNode::Ddot(Rc::clone(&a.node), Rc::clone(&b.node));
-                        Value::Scalar(ScalarValue::over(node, &[a.facts, b.facts]))
-                    }
-                    None => Value::Broken,
-                }
+                a.zip(b).map_or(Value::Broken, |(a, b)| Value::Scalar(a.ddot(&b)))
             }
             _ => match scalars(self) {
-                Some(values) => self.scalar_function(name, span, &values, arguments[0].span()),
+                Some(values) => {
+                    let places: Vec<Span> = arguments.iter().map(Spanned::span).collect();
+                    self.scalar_function(name, span, &values, &places)
+                }
                 None => Value::Broken,
             },
         }
     }
 
-    /// A function of scalars alone. `span` is the call's place, `first` that of its first argument.
-    fn scalar_function(&mut self, name: &str, span: Span, values: &[ScalarValue], first: Span) -> Value {
+    /// A function of scalars alone. `span` is the call's place, `places` are those of its arguments.
+    fn scalar_function(&mut self, name: &str, span: Span, values: &[ScalarValue], places: &[Span]) -> Value {
         let number = ScalarValue::whole;
+        let first = places[0];
+        match (name, values) {
+            ("ln" | "exp", [x]) => self.pure(&format!("`{name}` takes"), x.facts.dimension, first),
+            ("shear_modulus" | "lame_lambda" | "bulk_modulus", [_, poisson]) => {
+                self.pure(&format!("the second argument of `{name}` is"), poisson.facts.dimension, places[1]);
+            }
+            _ => {}
+        }
         let value = match (name, values) {
             ("ln" | "sqrt", [x]) if x.is_non_positive() => {
                 let reason = format!("`{name}` of a constant that is not positive");
                 return self.broken(first, reason, "give it a positive number");
             }
-            ("ln", [x]) => x.apply(ScalarNode::Ln),
-            ("sqrt", [x]) => x.apply(ScalarNode::Sqrt),
-            ("exp", [x]) => x.apply(ScalarNode::Exp),
-            ("pos", [x]) => ScalarValue::select(x, &number(0), x, &number(0)),
+            ("ln", [x]) => {
+                self.positive("ln", x, first);
+                x.transcendental(ScalarNode::Ln, Interval::ln)
+            }
+            ("sqrt", [x]) => {
+                self.positive("sqrt", x, first);
+                x.sqrt()
+            }
+            ("exp", [x]) => x.transcendental(ScalarNode::Exp, Interval::exp),
+            ("pos", [x]) => x.pos(),
             // mu = E / (2 (1 + nu))
             ("shear_modulus", [young, poisson]) => {
                 let divisor = number(2).mul(&number(1).add(poisson));
@@ -219,59 +227,14 @@ impl Lowering<'_> {
         match name.as_str() {
             "powi" => {
                 let power = self.integer(&call.args[0], IntegerType::I32, scope);
-                self.integer_power(Some(receiver), power, call.args[0].span())
+                self.integer_power(Some(receiver), power, call.receiver.span(), call.args[0].span())
             }
             "powf" => {
                 let power = self.scalar(&call.args[0], scope);
                 self.real_power(Some(receiver), power, call.receiver.span(), call.args[0].span())
             }
-            _ => self.scalar_function(&name, span, &[receiver], call.receiver.span()),
+            _ => self.scalar_function(&name, span, &[receiver], &[call.receiver.span()]),
         }
-    }
-
-    fn powi(&mut self, base: &Expr, power: &Expr, scope: &Scope) -> Value {
-        let (value, n) = (self.scalar(base, scope), self.integer(power, IntegerType::I32, scope));
-        self.integer_power(value, n, power.span())
-    }
-
-    fn integer_power(&mut self, base: Option<ScalarValue>, power: Option<i64>, span: Span) -> Value {
-        let Some((base, power)) = base.zip(power) else { return Value::Broken };
-        match i32::try_from(power) {
-            Ok(power) if power < 0 && base.is_zero() => self.broken(
-                span,
-                "division by zero: a negative power of zero",
-                "change the base or the power: the energy would be infinite everywhere",
-            ),
-            Ok(power) => {
-                let node = ScalarNode::Powi(Rc::clone(&base.node), power);
-                Value::Scalar(ScalarValue::over(node, &[base.facts]))
-            }
-            Err(_) => self.broken(span, format!("the power {power} is too large"), "a power is a 32-bit integer"),
-        }
-    }
-
-    fn powf(&mut self, base: &Expr, power: &Expr, scope: &Scope) -> Value {
-        let (value, exponent) = (self.scalar(base, scope), self.scalar(power, scope));
-        self.real_power(value, exponent, base.span(), power.span())
-    }
-
-    fn real_power(
-        &mut self,
-        base: Option<ScalarValue>,
-        power: Option<ScalarValue>,
-        base_span: Span,
-        power_span: Span,
-    ) -> Value {
-        let Some((base, power)) = base.zip(power) else { return Value::Broken };
-        if power.facts.strain {
-            let remedy = "write `exp(a * ln(x))` if that is meant";
-            return self.broken(power_span, "the exponent of `powf` depends on the strain", remedy);
-        }
-        if base.is_non_positive() {
-            return self.broken(base_span, "`powf` of a constant that is not positive", "give it a positive number");
-        }
-        let node = ScalarNode::Powf(Rc::clone(&base.node), Rc::clone(&power.node));
-        Value::Scalar(ScalarValue::over(node, &[base.facts, power.facts]))
     }
 
     /// `select(a > b, x, y)`, for all four comparisons by the one that the tree has.
@@ -293,13 +256,16 @@ impl Lowering<'_> {
         let x = self.scalar(&arguments[1], scope);
         let y = self.scalar(&arguments[2], scope);
         let (Some(a), Some(b), Some(x), Some(y)) = (a, b, x, y) else { return Value::Broken };
-        Value::Scalar(match comparison.op {
+        self.same("what it is compared with", a.facts.dimension, b.facts.dimension, comparison.right.span());
+        let fits = self.same("the other branch", x.facts.dimension, y.facts.dimension, arguments[2].span());
+        let selected = match comparison.op {
             BinOp::Lt(_) => ScalarValue::select(&b, &a, &x, &y),
             // a >= b is not b > a.
             BinOp::Ge(_) => ScalarValue::select(&b, &a, &y, &x),
             BinOp::Le(_) => ScalarValue::select(&a, &b, &y, &x),
             _ => ScalarValue::select(&a, &b, &x, &y),
-        })
+        };
+        Value::Scalar(if fits { selected } else { selected.of_any_dimension() })
     }
 
     /// `sum(0..N, |i| term)`, written out.
@@ -333,11 +299,17 @@ impl Lowering<'_> {
                 return self.broken(range.span(), reason, remedy);
             }
         }
+        let body = closure.body.span();
         let mut total: Option<ScalarValue> = None;
         for value in start..end {
             let mut inner = scope.clone();
             inner.push((name.clone(), Value::Integer(Integer { value, kind: IntegerType::Usize })));
             let Some(term) = self.scalar(&closure.body, &inner) else { return Value::Broken };
+            if let Some(total) = &total
+                && !self.same("the sum of the terms before it", total.facts.dimension, term.facts.dimension, body)
+            {
+                return Value::Broken;
+            }
             total = Some(total.map_or_else(|| term.clone(), |total| total.add(&term)));
         }
         // The declared result type of `sum` gives literals their type.

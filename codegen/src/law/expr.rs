@@ -6,10 +6,14 @@ use proc_macro2::Span;
 use syn::spanned::Spanned;
 use syn::{Expr, Lit, Member};
 
-use super::ast::{Invariant, Parameter, ScalarNode, TensorNode};
+use super::ast::{Parameter, ScalarNode};
+use super::defined::Declared;
+use super::dimension::Dimension;
 use super::error::{LawError, Source};
 use super::functions::Function;
+use super::interval::{Interval, Values};
 use super::literals;
+use super::metadata::Metadata;
 use super::value::{Facts, Integer, IntegerType, ScalarValue, TensorValue, Value};
 use super::words;
 
@@ -28,26 +32,38 @@ pub(super) struct Lowering<'a> {
     pub(super) source: Source<'a>,
     pub(super) errors: Vec<LawError>,
     pub(super) parameters: &'a [Parameter],
+    /// Parameters of any dimension, by index: their units were refused.
+    unknown_units: &'a BTreeSet<usize>,
     pub(super) functions: BTreeMap<String, Function<'a>>,
     pub(super) constants: BTreeMap<String, Value>,
     /// Functions that are being inlined, outermost first.
     pub(super) stack: Vec<String>,
     /// Functions that were called.
     pub(super) called: BTreeSet<String>,
+    /// What the struct's attributes say of the law.
+    pub(super) declared: Declared,
+    /// Whether `eps` was used.
+    pub(super) uses_eps: bool,
+    /// Whether the expression is the domain's: names are then those of the strain's fields.
+    pub(super) in_domain: bool,
     levels: usize,
     steps: usize,
 }
 
 impl<'a> Lowering<'a> {
-    pub(super) fn new(source: Source<'a>, parameters: &'a [Parameter]) -> Self {
+    pub(super) fn new(source: Source<'a>, metadata: &'a Metadata) -> Self {
         Lowering {
             source,
             errors: Vec::new(),
-            parameters,
+            parameters: &metadata.parameters,
+            unknown_units: &metadata.unknown_units,
             functions: BTreeMap::new(),
             constants: BTreeMap::new(),
             stack: Vec::new(),
             called: BTreeSet::new(),
+            declared: Declared { domain: metadata.has_domain, small_strain: metadata.small_strain.is_some() },
+            uses_eps: false,
+            in_domain: false,
             levels: 0,
             steps: 0,
         }
@@ -256,7 +272,11 @@ impl<'a> Lowering<'a> {
 
     fn name(&mut self, name: &str, span: Span, scope: &Scope) -> Value {
         if let Some((_, value)) = scope.iter().rev().find(|(known, _)| known == name) {
-            return value.clone();
+            let value = value.clone();
+            if self.in_domain && words::STRAIN.contains(&name) {
+                self.measured(name, span);
+            }
+            return value;
         }
         if let Some(value) = self.constants.get(name) {
             return value.clone();
@@ -288,22 +308,6 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    fn strain_field(&mut self, name: &str, span: Span) -> Value {
-        if let Some(value) = strain(name) {
-            return value;
-        }
-        let intro = "the strain offers";
-        if words::unsupported(name) {
-            let reason = format!("`{name}` (fibres and principal stretches) is not supported by this version");
-            return self.broken(span, reason, words::suggest("", words::STRAIN, intro));
-        }
-        if matches!(name, "F" | "G") {
-            let reason = format!("the strain does not offer `{name}`: an energy of it could change under rotation");
-            return self.broken(span, reason, "write the energy in C, E or the invariants");
-        }
-        self.broken(span, format!("the strain has no field `{name}`"), words::suggest(name, words::STRAIN, intro))
-    }
-
     fn parameter_field(&mut self, name: &str, span: Span) -> Value {
         if let Some(index) = self.parameters.iter().position(|parameter| parameter.name == name) {
             return self.parameter(index);
@@ -316,11 +320,15 @@ impl<'a> Lowering<'a> {
     /// Parameter number `index`, a scalar or an array.
     pub(super) fn parameter(&self, index: usize) -> Value {
         // `[f64; 1]` is refused: a longer length means an array.
-        if self.parameters[index].len > 1 {
-            Value::Array(index)
-        } else {
-            Value::Scalar(ScalarValue::leaf(ScalarNode::Parameter { parameter: index, component: 0 }, false))
-        }
+        if self.parameters[index].len > 1 { Value::Array(index) } else { Value::Scalar(self.component(index, 0)) }
+    }
+
+    /// A component of a parameter.
+    fn component(&self, parameter: usize, component: usize) -> ScalarValue {
+        let Parameter { unit, range: (low, high), .. } = &self.parameters[parameter];
+        let values = Values::of(Interval::new(*low, *high));
+        let dimension = (!self.unknown_units.contains(&parameter)).then(|| Dimension::of(unit));
+        ScalarValue::leaf(ScalarNode::Parameter { parameter, component }, false, dimension, values)
     }
 
     fn index(&mut self, index: &syn::ExprIndex, scope: &Scope) -> Value {
@@ -330,9 +338,7 @@ impl<'a> Lowering<'a> {
             (Value::Array(parameter), Some(component)) => {
                 let Parameter { name, len, .. } = &self.parameters[parameter];
                 match usize::try_from(component) {
-                    Ok(component) if component < *len => {
-                        Value::Scalar(ScalarValue::leaf(ScalarNode::Parameter { parameter, component }, false))
-                    }
+                    Ok(component) if component < *len => Value::Scalar(self.component(parameter, component)),
                     _ => {
                         let reason = format!("`{name}` has no component {component}");
                         let remedy = format!("its components are 0 to {}", len - 1);
@@ -368,23 +374,5 @@ impl<'a> Lowering<'a> {
                 self.broken(cast.expr.span(), reason, "remove the `as`")
             }
         }
-    }
-}
-
-/// The strain's field of that name.
-pub(super) fn strain(name: &str) -> Option<Value> {
-    let invariant = |i| Some(Value::Scalar(ScalarValue::leaf(ScalarNode::Invariant(i), true)));
-    let tensor = |node| Some(Value::Tensor(TensorValue::leaf(node)));
-    match name {
-        "eps" => tensor(TensorNode::Eps),
-        "E" => tensor(TensorNode::E),
-        "C" => tensor(TensorNode::C),
-        "I1" => invariant(Invariant::I1),
-        "I2" => invariant(Invariant::I2),
-        "I3" => invariant(Invariant::I3),
-        "J" => invariant(Invariant::J),
-        "I1bar" => invariant(Invariant::I1bar),
-        "I2bar" => invariant(Invariant::I2bar),
-        _ => None,
     }
 }

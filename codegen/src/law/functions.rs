@@ -35,6 +35,13 @@ pub(super) struct Function<'a> {
     body: &'a Block,
 }
 
+impl Function<'_> {
+    /// The place of the value with which the body ends.
+    pub(super) fn value_place(&self) -> Span {
+        self.body.stmts.last().map_or(self.span, Spanned::span)
+    }
+}
+
 /// The signature that the energy has to have.
 pub(super) const ENERGY_SIGNATURE: &str = "(s: Strain, p: Parameters) -> f64";
 

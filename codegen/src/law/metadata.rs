@@ -1,5 +1,7 @@
 //! The metadata of a law: doc comments, and `struct Parameters` with its attributes.
 
+use std::collections::BTreeSet;
+
 use proc_macro2::Span;
 use syn::punctuated::Punctuated;
 use syn::spanned::Spanned;
@@ -13,7 +15,7 @@ use super::words;
 /// Components that an array parameter may have.
 const MAX_COMPONENTS: usize = 64;
 
-const ON_STRUCT: &[&str] = &["domain"];
+const ON_STRUCT: &[&str] = &["domain", "small_strain"];
 const ON_FIELD: &[&str] = &["unit", "range", "default", "per_element"];
 
 /// `struct Parameters`, read.
@@ -22,8 +24,14 @@ pub(super) struct Metadata {
     pub(super) parameters: Vec<Parameter>,
     /// The place of each parameter's name.
     pub(super) spans: Vec<Span>,
+    /// Parameters whose unit is missing or was refused, by index: they fit any dimension.
+    pub(super) unknown_units: BTreeSet<usize>,
     /// The expression of `#[domain(..)]` and its place.
     pub(super) domain: Option<(Expr, Span)>,
+    /// Whether there is a `#[domain(..)]`, be it readable or not.
+    pub(super) has_domain: bool,
+    /// The place of `#[small_strain]`.
+    pub(super) small_strain: Option<Span>,
 }
 
 /// The name of a type that is a plain name.
@@ -58,6 +66,15 @@ pub(super) fn read(source: &Source, item: &ItemStruct, errors: &mut Vec<LawError
         errors.push(source.error(item.generics.span(), "`Parameters` has no generics", "its fields are f64"));
     }
     for attribute in known(source, &item.attrs, ON_STRUCT, "the struct", errors) {
+        if attribute.path().is_ident("small_strain") {
+            metadata.small_strain = Some(attribute.span());
+            if !matches!(attribute.meta, Meta::Path(_)) {
+                let reason = "`small_strain` takes nothing";
+                errors.push(source.error(attribute.span(), reason, "write `#[small_strain]`"));
+            }
+            continue;
+        }
+        metadata.has_domain = true;
         match attribute.parse_args::<Expr>() {
             Ok(expr) => metadata.domain = Some((expr, attribute.span())),
             Err(_) => {
@@ -88,7 +105,11 @@ pub(super) fn read(source: &Source, item: &ItemStruct, errors: &mut Vec<LawError
             let reason = format!("`{name}` is a measure of the strain");
             errors.push(source.error(span, reason, "give the parameter another name, such as `young`"));
         }
-        metadata.parameters.push(parameter(source, field, name, span, errors));
+        let (parameter, has_unit) = parameter(source, field, name, span, errors);
+        if !has_unit {
+            metadata.unknown_units.insert(metadata.parameters.len());
+        }
+        metadata.parameters.push(parameter);
         metadata.spans.push(span);
     }
     metadata
@@ -122,7 +143,14 @@ fn known<'a>(
     found
 }
 
-fn parameter(source: &Source, field: &syn::Field, name: String, span: Span, errors: &mut Vec<LawError>) -> Parameter {
+/// A parameter, and whether its unit could be read.
+fn parameter(
+    source: &Source,
+    field: &syn::Field,
+    name: String,
+    span: Span,
+    errors: &mut Vec<LawError>,
+) -> (Parameter, bool) {
     let mut error = |span: Span, reason: String, remedy: &str| errors.push(source.error(span, reason, remedy));
     let len = match length(&field.ty) {
         Ok(len) => len,
@@ -140,17 +168,17 @@ fn parameter(source: &Source, field: &syn::Field, name: String, span: Span, erro
         );
     }
     let (mut unit, mut range, mut default, mut per_element) = (None, None, None, false);
+    let mut unit_given = false;
     for attribute in known(source, &field.attrs, ON_FIELD, "a parameter", errors) {
         let mut error = |span: Span, reason: String, remedy: &str| errors.push(source.error(span, reason, remedy));
         let place = attribute.span();
         if attribute.path().is_ident("unit") {
+            unit_given = true;
             let parsed = attribute.parse_args::<LitStr>();
             match parsed.map_err(|_| String::from("`unit` takes a text")).and_then(|text| units::parse(&text.value())) {
                 Ok(parsed) => unit = Some(parsed),
                 Err(reason) => {
                     error(place, reason, "write `#[unit(\"Pa\")]`: products of powers of 1, Pa, m, s, N, J and rad");
-                    // Present, though wrong: it is not reported as missing too.
-                    unit = units::parse("1").ok();
                 }
             }
         } else if attribute.path().is_ident("range") {
@@ -176,7 +204,7 @@ fn parameter(source: &Source, field: &syn::Field, name: String, span: Span, erro
         }
     }
     let mut error = |span: Span, reason: String, remedy: &str| errors.push(source.error(span, reason, remedy));
-    if unit.is_none() {
+    if !unit_given {
         error(
             span,
             format!("the parameter `{name}` has no unit"),
@@ -196,8 +224,10 @@ fn parameter(source: &Source, field: &syn::Field, name: String, span: Span, erro
             error(*place, reason, "change the default or the range");
         }
     }
+    let has_unit = unit.is_some();
     let unit = unit.unwrap_or(super::ast::Unit { text: String::from("1"), length: 0, stress: 0, time: 0 });
-    Parameter { name, docs: text, unit, range, default: default.map(|(values, _)| values), per_element, len }
+    let default = default.map(|(values, _)| values);
+    (Parameter { name, docs: text, unit, range, default, per_element, len }, has_unit)
 }
 
 /// The number of components of a parameter's type.

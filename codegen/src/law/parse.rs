@@ -9,9 +9,10 @@ use syn::{Expr, Item, ItemConst};
 
 use super::ast::{Domain, Law, Scalar};
 use super::error::{LawError, Place, Source};
-use super::expr::{Lowering, Scope, strain};
+use super::expr::{Lowering, Scope};
 use super::functions::{ArgumentType, ENERGY_SIGNATURE, Function, is_energy};
 use super::metadata::{self, Metadata, type_name};
+use super::strain::strain;
 use super::uses::unused;
 use super::value::{Integer, IntegerType, ScalarValue, Value};
 use super::{brackets, calls, limits, words};
@@ -54,7 +55,7 @@ pub fn parse(path: &str, text: &str) -> Result<Law, Vec<LawError>> {
     }
     let items = Items::sort(&source, &file.items, &mut errors);
     let metadata = items.metadata.unwrap_or_default();
-    let mut lowering = Lowering::new(source, &metadata.parameters);
+    let mut lowering = Lowering::new(source, &metadata);
     lowering.errors = errors;
     for function in items.functions {
         lowering.functions.insert(function.name.clone(), function);
@@ -69,6 +70,10 @@ pub fn parse(path: &str, text: &str) -> Result<Law, Vec<LawError>> {
         && let Some((energy, parts)) = &energy
     {
         lowering.uncalled();
+        if let Some(place) = metadata.small_strain.filter(|_| !lowering.uses_eps) {
+            let reason = "the law says `small_strain`, and does not use `eps`";
+            lowering.error(place, reason, "remove the attribute: the law does not change under rotation");
+        }
         let unused = unused(&source, &metadata, energy, parts, domain.as_ref());
         lowering.errors.extend(unused);
     }
@@ -76,7 +81,8 @@ pub fn parse(path: &str, text: &str) -> Result<Law, Vec<LawError>> {
     match energy {
         Some((energy, parts)) if errors.is_empty() => {
             let (path, text) = (path.to_owned(), text.to_owned());
-            Ok(Law { name, path, text, docs, parameters: metadata.parameters, domain, energy, parts })
+            let small_strain = metadata.small_strain.is_some();
+            Ok(Law { name, path, text, docs, parameters: metadata.parameters, domain, small_strain, energy, parts })
         }
         _ => Err(sorted(errors)),
     }
@@ -275,6 +281,11 @@ impl Lowering<'_> {
             self.error(span, format!("`{name}` does not depend on the strain"), remedy);
             return None;
         }
+        let place = self.functions.get(name).map_or(span, Function::value_place);
+        // A struct without fields was refused: no energy is in Pa without them.
+        if !self.parameters.is_empty() {
+            self.energy_dimension(name, value.facts.dimension, place);
+        }
         Some(value)
     }
 
@@ -299,9 +310,13 @@ impl Lowering<'_> {
         let measures = words::STRAIN.iter().filter_map(|name| Some(((*name).to_owned(), strain(name)?)));
         let parameters = self.parameters.iter().enumerate().map(|(i, p)| (p.name.clone(), self.parameter(i)));
         let scope: Scope = parameters.chain(measures).collect();
+        self.in_domain = true;
         let left = self.scalar(&comparison.left, &scope);
         let right = self.scalar(&comparison.right, &scope);
+        self.in_domain = false;
         let (left, right) = left.zip(right)?;
+        let place = comparison.right.span();
+        self.same("what it is compared with", left.facts.dimension, right.facts.dimension, place);
         if !left.facts.strain && !right.facts.strain {
             self.error(span, "the domain does not depend on the strain", remedy);
             return None;

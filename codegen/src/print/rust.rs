@@ -110,7 +110,7 @@ pub fn format(tokens: TokenStream) -> Result<String, syn::Error> {
 }
 
 fn info(law: &Law, derivation: &Derivation, reviewed: bool) -> TokenStream {
-    let (name, docs) = (&law.name, law.docs.trim());
+    let (name, docs, small_strain) = (&law.name, law.docs.trim(), law.small_strain);
     let parameters = law.parameters.iter().map(parameter);
     let domain = match &law.domain {
         Some(d) => {
@@ -135,6 +135,7 @@ fn info(law: &Law, derivation: &Derivation, reviewed: bool) -> TokenStream {
             docs: #docs,
             parameters: &[#(#parameters),*],
             domain: #domain,
+            small_strain: #small_strain,
             constants: &[#(#constants),*],
             structure: Structure { linear: #linear, uses_j: #uses_j, polynomial: #polynomial },
             operations: &[#(#operations),*],

@@ -1,4 +1,4 @@
-//! A crate with a law of its own: `laws/mooney_rivlin.rs` is all that it states, the kernels are generated.
+//! A crate with a law of its own: `laws/gent.rs` is all that it states, the kernels are generated.
 //!
 //! To do the same in your crate: copy `build.rs`, the dependencies in `Cargo.toml`, and [`generated`]. Write
 //! `laws/derived/` with `tensormass law derive laws/NAME.rs --out laws/derived` and commit it; your crate then builds
@@ -10,4 +10,4 @@ pub mod generated {
     include!(concat!(env!("OUT_DIR"), "/kernels.rs"));
 }
 
-pub use generated::mooney_rivlin::Law as MooneyRivlin;
+pub use generated::gent::Law as Gent;

@@ -115,10 +115,40 @@ pub fn parameters(law: &LawEntry) -> Vec<f64> {
     law.info.parameters.iter().flat_map(|p| p.default.map_or_else(|| one(p), <[f64]>::to_vec)).collect()
 }
 
+/// The laws that tests/reference/cases.json has, and its names of them.
+pub const REFERENCE: [(&str, &str); 6] = [
+    ("hooke", "hooke"),
+    ("st_venant_kirchhoff", "svk"),
+    ("neo_hookean", "nh_log"),
+    ("neo_hookean_isochoric", "iso_nh"),
+    ("stable_neo_hookean", "stable_nh"),
+    ("mooney_rivlin", "mooney"),
+];
+
+/// The parameters of those cases, by name; of other laws those of [`parameters`].
+pub fn reference_parameters(law: &LawEntry) -> Vec<f64> {
+    let (young, poisson) = (1e6, 0.3);
+    let mu = young / (2.0 * (1.0 + poisson));
+    let named = |p: &tensormass_runtime::ParameterInfo| match p.name {
+        "young" => Some(young),
+        "poisson" => Some(poisson),
+        "mu1" => Some(0.75 * mu),
+        "mu2" => Some(0.25 * mu),
+        "lambda" => Some(young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)) - mu / 2.0),
+        _ => None,
+    };
+    let all: Option<Vec<f64>> = law.info.parameters.iter().map(named).collect();
+    all.unwrap_or_else(|| parameters(law))
+}
+
 /// The parameters of [`parameters`] as a TOML table.
 pub fn parameters_text(law: &LawEntry) -> String {
-    let values = parameters(law);
-    let mut rest = values.as_slice();
+    table(law, &parameters(law))
+}
+
+/// Parameters as a TOML table.
+pub fn table(law: &LawEntry, values: &[f64]) -> String {
+    let mut rest = values;
     let mut items = Vec::new();
     for p in law.info.parameters {
         let (now, later) = rest.split_at(p.len);
