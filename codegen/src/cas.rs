@@ -15,9 +15,9 @@ pub struct Cas {
     symbols: Vec<symbolica::atom::Symbol>,
 }
 
-/// Something came back from the computer algebra system that this generator does not understand.
+/// A term that the computer algebra system and this generator do not both understand.
 #[derive(Debug, Clone, thiserror::Error)]
-#[error("the computer algebra system returned `{0}`, which has no meaning here")]
+#[error("`{0}` has no meaning to the computer algebra system and to this generator alike")]
 pub struct UnexpectedTerm(pub String);
 
 impl Cas {
@@ -35,19 +35,22 @@ impl Cas {
         self.symbols[s.0 as usize]
     }
 
-    fn atom(&mut self, e: &Expr) -> Atom {
-        match e {
+    /// The system's form of an expression; functions that only stages with given derivatives use have none.
+    fn atom(&mut self, e: &Expr) -> Result<Atom, UnexpectedTerm> {
+        Ok(match e {
             Expr::Number(q) => number(*q),
             Expr::Symbol(s) => Atom::var(self.symbol(*s)),
-            Expr::Sum(xs) => xs.iter().fold(Atom::num(0), |sum, x| sum + self.atom(x)),
-            Expr::Product(xs) => xs.iter().fold(Atom::num(1), |product, x| product * self.atom(x)),
+            Expr::Sum(xs) => xs.iter().try_fold(Atom::num(0), |sum, x| Ok(sum + self.atom(x)?))?,
+            Expr::Product(xs) => xs.iter().try_fold(Atom::num(1), |product, x| Ok(product * self.atom(x)?))?,
             Expr::Power(a, b) => {
-                let (a, b) = (self.atom(a), self.atom(b));
+                let (a, b) = (self.atom(a)?, self.atom(b)?);
                 a.pow(b)
             }
-            Expr::Ln(a) => self.atom(a).log(),
-            Expr::Exp(a) => self.atom(a).exp(),
-        }
+            Expr::Ln(a) => self.atom(a)?.log(),
+            Expr::Exp(a) => self.atom(a)?.exp(),
+            Expr::Log1p(_) => return Err(UnexpectedTerm("log1p".into())),
+            Expr::Expm1(_) => return Err(UnexpectedTerm("expm1".into())),
+        })
     }
 
     fn expr(&self, view: AtomView) -> Result<Expr, UnexpectedTerm> {
@@ -97,7 +100,7 @@ impl Cas {
     /// # Errors
     /// The system answered in terms that have no meaning here.
     pub fn normalize(&mut self, e: &Expr) -> Result<Expr, UnexpectedTerm> {
-        let atom = self.atom(e);
+        let atom = self.atom(e)?;
         self.expr(atom.as_view())
     }
 
@@ -106,7 +109,7 @@ impl Cas {
     /// # Errors
     /// The system answered in terms that have no meaning here.
     pub fn expand(&mut self, e: &Expr) -> Result<Expr, UnexpectedTerm> {
-        let atom = self.atom(e).expand();
+        let atom = self.atom(e)?.expand();
         self.expr(atom.as_view())
     }
 
@@ -115,7 +118,7 @@ impl Cas {
     /// # Errors
     /// The system answered in terms that have no meaning here.
     pub fn derivative(&mut self, e: &Expr, by: Symbol) -> Result<Expr, UnexpectedTerm> {
-        let atom = self.atom(e).derivative(self.symbol(by));
+        let atom = self.atom(e)?.derivative(self.symbol(by));
         self.expr(atom.as_view())
     }
 }

@@ -25,6 +25,10 @@ pub enum Expr {
     Ln(Box<Expr>),
     /// Exponential.
     Exp(Box<Expr>),
+    /// ln(1 + x).
+    Log1p(Box<Expr>),
+    /// exp(x) - 1.
+    Expm1(Box<Expr>),
 }
 
 impl Expr {
@@ -63,7 +67,7 @@ impl Expr {
                 a.for_each_symbol(f);
                 b.for_each_symbol(f);
             }
-            Expr::Ln(a) | Expr::Exp(a) => a.for_each_symbol(f),
+            Expr::Ln(a) | Expr::Exp(a) | Expr::Log1p(a) | Expr::Expm1(a) => a.for_each_symbol(f),
         }
     }
 

@@ -201,9 +201,14 @@ impl<'a, N: FnMut(&Expr) -> Expr> Lowering<'a, N> {
                 let value = self.builder.push(Op::Powf(base, exponent));
                 *m.powers.entry(value).or_insert_with(Rational::zero) += r;
             }
-            (Expr::Ln(a), _) | (Expr::Exp(a), _) => {
+            (Expr::Ln(a) | Expr::Exp(a) | Expr::Log1p(a) | Expr::Expm1(a), _) => {
                 let a = self.value(a);
-                let value = self.builder.push(if matches!(e, Expr::Ln(_)) { Op::Ln(a) } else { Op::Exp(a) });
+                let value = self.builder.push(match e {
+                    Expr::Ln(_) => Op::Ln(a),
+                    Expr::Exp(_) => Op::Exp(a),
+                    Expr::Log1p(_) => Op::Log1p(a),
+                    _ => Op::Expm1(a),
+                });
                 *m.powers.entry(value).or_insert_with(Rational::zero) += r;
             }
             (Expr::Number(_) | Expr::Symbol(_) | Expr::Sum(_) | Expr::Product(_), _) => {

@@ -11,6 +11,8 @@ use crate::expr::{Expr, Rational, Symbol};
 use crate::ir::Input;
 use crate::quantity::{Kind, Quantities, Value};
 
+use super::spectral::Spectrum;
+
 /// The six components of a symmetric tensor, in the order in which they are stored.
 pub const SYMMETRIC: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
@@ -34,6 +36,8 @@ pub enum Invariant {
     Det(Base),
     /// det F.
     J,
+    /// The sum of the principal stretches to a power, by its number among those in use.
+    StretchSum(usize),
 }
 
 impl Invariant {
@@ -47,6 +51,7 @@ impl Invariant {
         match self {
             Invariant::Trace(b) | Invariant::Det(b) => b == base,
             Invariant::Ddot(a, b) => a == base || b == base,
+            Invariant::StretchSum(_) => base == Base::A,
             Invariant::J => false,
         }
     }
@@ -58,6 +63,9 @@ pub struct Strain {
     deformation: [Symbol; 9],
     bases: BTreeMap<Base, [Symbol; 6]>,
     jacobian: Option<Symbol>,
+    /// The exponents of the sums of principal stretches, and the decomposition that they share.
+    exponents: Vec<Expr>,
+    spectrum: Option<Spectrum>,
     invariants: BTreeMap<Invariant, Symbol>,
 }
 
@@ -74,7 +82,15 @@ impl Strain {
         let deformation = std::array::from_fn(|k| {
             if k % 4 == 0 { quantities.stage(name(k, "F"), Expr::int(1) + gradient[k].into()) } else { gradient[k] }
         });
-        Self { gradient, deformation, bases: BTreeMap::new(), jacobian: None, invariants: BTreeMap::new() }
+        Self {
+            gradient,
+            deformation,
+            bases: BTreeMap::new(),
+            jacobian: None,
+            exponents: vec![],
+            spectrum: None,
+            invariants: BTreeMap::new(),
+        }
     }
 
     /// G, row by row.
@@ -164,6 +180,12 @@ impl Strain {
         let label = |b: Base| if b == Base::A { "A" } else { "eps" };
         let symbol = match invariant {
             Invariant::J => self.jacobian(cas, quantities),
+            Invariant::StretchSum(k) => {
+                let c = self.base(cas, quantities, Base::A)?;
+                let spectrum =
+                    self.spectrum.get_or_insert_with(|| Spectrum::of_deformation(quantities, self.deformation, c));
+                spectrum.stretch_sum(quantities, &self.exponents[k])
+            }
             Invariant::Trace(b) => {
                 let c = self.base(cas, quantities, b)?;
                 quantities.stage(format!("tr{}", label(b)), Expr::Sum(c[..3].iter().map(|&s| s.into()).collect()))
@@ -191,6 +213,20 @@ impl Strain {
         };
         self.invariants.insert(invariant, symbol);
         Ok(symbol)
+    }
+
+    /// The symbol of the sum of the principal stretches to a power that depends on the parameters alone.
+    pub fn stretch_sum(
+        &mut self,
+        cas: &mut Cas,
+        quantities: &mut Quantities,
+        exponent: Expr,
+    ) -> Result<Symbol, UnexpectedTerm> {
+        let k = self.exponents.iter().position(|e| *e == exponent).unwrap_or_else(|| {
+            self.exponents.push(exponent);
+            self.exponents.len() - 1
+        });
+        self.invariant(cas, quantities, Invariant::StretchSum(k))
     }
 
     /// The derivatives of a strain component or of J by the components of G, as (3 i + j, derivative).

@@ -10,7 +10,7 @@ pub(crate) fn expression(e: &crate::expr::Expr, quantities: &crate::quantity::Qu
     let text = |e: &Expr| expression(e, quantities);
     let tight = |e: &Expr| match e {
         Expr::Number(q) if q.is_integer() && *q.numer() >= 0 => text(e),
-        Expr::Symbol(_) | Expr::Ln(_) | Expr::Exp(_) => text(e),
+        Expr::Symbol(_) | Expr::Ln(_) | Expr::Exp(_) | Expr::Log1p(_) | Expr::Expm1(_) => text(e),
         _ => format!("({})", text(e)),
     };
     match e {
@@ -25,5 +25,7 @@ pub(crate) fn expression(e: &crate::expr::Expr, quantities: &crate::quantity::Qu
         Expr::Power(a, b) => format!("{}^{}", tight(a), tight(b)),
         Expr::Ln(a) => format!("ln({})", text(a)),
         Expr::Exp(a) => format!("exp({})", text(a)),
+        Expr::Log1p(a) => format!("log1p({})", text(a)),
+        Expr::Expm1(a) => format!("expm1({})", text(a)),
     }
 }
