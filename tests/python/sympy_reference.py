@@ -442,7 +442,8 @@ def main(arguments):
     different = []
 
     def write(kind, name, states):
-        text = json.dumps({"law": name, "states": [s for s in states if s is not None]}, indent=1) + "\n"
+        states = [s for s in states if s is not None]
+        text = json.dumps({"law": name, "states": states}, indent=1) + "\n"
         target = ROOT / "tests/reference" / kind / f"{name}.json"
         if check:
             same = target.exists() and target.read_text() == text
