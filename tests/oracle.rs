@@ -40,13 +40,13 @@ fn check(law: &'static LawEntry, seed: u64, stretch: (f64, f64)) {
     let at_rest = energy(prelude::Strain::of([prelude::seeded(0.0, 0.0, 0.0); 9]), &parameters).x;
     let w = point.energy(&exact(&g)) - point.energy(&exact(&[0.0; 9]));
     let compare = |what: &str, kernel: Rounded, oracle: Rounded, magnitude: f64| {
-        let (difference, tolerance) =
-            ((kernel.value - oracle.value).abs(), kernel.bound(DOUBLE) + oracle.bound(DOUBLE));
+        // A bound beyond this part of the tangent's magnitude would prove nothing: running bounds of rotations, which
+        // do not know that the results are the same in any frame, may be beyond.
+        let bound = kernel.bound(DOUBLE) + oracle.bound(DOUBLE);
+        let (difference, tolerance) = ((kernel.value - oracle.value).abs(), bound.min(1e-9 * magnitude));
         let (kernel, oracle) = (kernel.value, oracle.value);
         let context = format!("{name}, seed {seed}, parameters {:?}, G {g:?}, dG {d:?}", point.parameters);
         assert!(difference <= tolerance, "{what}: {kernel} against {oracle}, tolerance {tolerance:e}; {context}");
-        // What the bound may take of the tangent's magnitude before the comparison proves nothing.
-        assert!(tolerance <= 1e-9 * magnitude, "{what}: tolerance {tolerance:e} of {magnitude:e}; {context}");
     };
     let magnitude = |a: &[Rounded]| a.iter().fold(0.0f64, |m, x| m.max(x.value.abs()));
     let scale = magnitude(&dp).max(magnitude(&p));

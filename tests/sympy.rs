@@ -44,15 +44,13 @@ fn check(law: &'static LawEntry, state: &Value, context: &str) {
         for (k, value) in expected.iter().enumerate() {
             // The 25 digits are rounded to f64 here.
             for (kind, actual, u, most) in [("f64", double[k].value, DOUBLE, 1e-12), ("f32", single[k], SINGLE, 5e-4)] {
-                let tolerance = double[k].bound(u) + DOUBLE * value.abs();
+                // A bound beyond the most would prove nothing: running bounds of rotations, which do not know that the
+                // results are the same in any frame, may be beyond.
+                let tolerance = (double[k].bound(u) + DOUBLE * value.abs()).min(most * scale);
                 let difference = (actual - value).abs();
                 assert!(
                     difference <= tolerance,
                     "{context}: {what} {k} in {kind} is {actual}, not {value}, tolerance {tolerance:e}"
-                );
-                assert!(
-                    tolerance <= most * scale,
-                    "{context}: {what} {k} in {kind}: the tolerance {tolerance:e} proves nothing about {scale:e}"
                 );
             }
         }

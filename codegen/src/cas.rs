@@ -15,9 +15,9 @@ pub struct Cas {
     symbols: Vec<symbolica::atom::Symbol>,
 }
 
-/// Something came back from the computer algebra system that this generator does not understand.
+/// A term that the computer algebra system and this generator do not both understand.
 #[derive(Debug, Clone, thiserror::Error)]
-#[error("the computer algebra system returned `{0}`, which has no meaning here")]
+#[error("`{0}` has no meaning to the computer algebra system and to this generator alike")]
 pub struct UnexpectedTerm(pub String);
 
 impl Cas {

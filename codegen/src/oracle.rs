@@ -89,7 +89,7 @@ pub fn table(names: &[&str]) -> Result<String, syn::Error> {
     let texts = names.iter().map(ToString::to_string);
     let file = quote! {
         #(
-            #[allow(unused_imports, unused_qualifications, non_snake_case)]
+            #[allow(unused_imports, unused_qualifications, non_snake_case, clippy::identity_op)]
             mod #names {
                 #[allow(non_camel_case_types)]
                 type f64 = super::prelude::Number;

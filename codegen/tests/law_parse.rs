@@ -15,6 +15,7 @@ fn scalar(law: &Law, node: &Scalar) -> String {
             if parameter.len > 1 { format!("{}[{component}]", parameter.name) } else { parameter.name.clone() }
         }
         ScalarNode::Invariant(invariant) => format!("{invariant:?}"),
+        ScalarNode::StretchSum(a) => format!("stretches^{}", s(a)),
         ScalarNode::Trace(a) => format!("tr({})", t(a)),
         ScalarNode::Det(a) => format!("det({})", t(a)),
         ScalarNode::Ddot(a, b) => format!("ddot({}, {})", t(a), t(b)),
@@ -90,6 +91,8 @@ fn arithmetic_is_kept_as_written() {
 
 #[test]
 fn tensors_and_their_functions() {
+    check_expression("p.mu * s.stretch_sum(-1.5)", "(mu * stretches^-3/2)");
+    check_expression("sum(0..3, |i| s.stretch_sum(p.c[i]))", "((stretches^c[0] + stretches^c[1]) + stretches^c[2])");
     check_expression("p.mu * tr(s.E).powi(2)", "(mu * tr(E)^2)");
     check_expression("p.mu * ddot(s.eps, s.C) + p.mu * det(s.C)", "((mu * ddot(eps, C)) + (mu * det(C)))");
     check_expression(

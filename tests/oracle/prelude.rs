@@ -5,6 +5,9 @@ use std::ops::{Add, Div, Mul, Neg, Range, Sub};
 use tensormass_testing::codegen::ir::Number as _;
 use tensormass_testing::rounding::Rounded;
 
+#[path = "stretches.rs"]
+mod stretches;
+
 /// x + a e1 + b e2 + c e1 e2 with e1^2 = e2^2 = 0: value, two first derivatives, and the mixed second one.
 #[derive(Clone, Copy)]
 pub struct Number {
@@ -175,6 +178,13 @@ impl Strain {
         let (i1bar, i2bar) = (i1 / square, i2 / (square * square));
         let e = (c - identity()) * half;
         Self { eps, E: e, C: c, I1: i1, I2: i2, I3: j * j, J: j, I1bar: i1bar, I2bar: i2bar }
+    }
+}
+
+impl Strain {
+    /// The sum of the principal stretches to a power that depends on parameters alone.
+    pub fn stretch_sum(self, exponent: Number) -> Number {
+        stretches::trace_of_power(self.C, exponent.x * Rounded::exact(0.5))
     }
 }
 

@@ -7,7 +7,8 @@ compares the kernels with the committed values and needs no Python; CI runs this
 
     python3 tests/python/sympy_reference.py [--check] [NAME ..]      (needs sympy, tested with 1.14)
 
-writes tests/reference/sympy/NAME.json, or with --check compares and exits with status 1 where a file differs.
+writes tests/reference/sympy/NAME.json, and of laws in the principal stretches tests/reference/stretches/NAME.json, at
+states with nearly equal ones; or with --check compares and exits with status 1 where a file differs.
 """
 
 import json
@@ -16,6 +17,7 @@ import sys
 from fractions import Fraction
 from pathlib import Path
 
+import mpmath
 import sympy as sp
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -33,6 +35,7 @@ class Law:
         self.tokens = [next((k, t) for k, t in enumerate(m.groups()) if t) for m in TOKEN.finditer(text.rstrip())]
         self.at = 0
         self.parameters, self.functions, self.constants, self.domain = [], {}, {}, None
+        self.defaults = {}
         while self.at < len(self.tokens):
             self.item()
 
@@ -91,13 +94,15 @@ class Law:
     def struct(self):
         self.next(), self.next("{")
         while not self.accept("}"):
-            unit, bounds, length = "1", None, None
+            unit, bounds, length, default = "1", None, None, None
             while self.peek() == "#":
                 name, place = self.attribute()
                 if name == "unit":
                     unit = self.at_place(place, self.string)
                 elif name == "range":
                     bounds = self.at_place(place, lambda: self.arguments({}, ")"))
+                elif name == "default":
+                    default = self.at_place(place, lambda: self.arguments({}, ")"))
             name = self.next()
             self.next(":")
             if self.accept("["):
@@ -108,6 +113,7 @@ class Law:
                 self.next("f64")
             self.accept(",")
             self.parameters.append((name, unit, bounds, length))
+            self.defaults[name] = default if length or not default else default[0]
 
     def string(self):
         self.next('"')
@@ -252,7 +258,42 @@ def ddot(a, b):
     return sum(x * y for x, y in zip(a, b))
 
 
+def stretch_sum(strain, exponent):
+    """The sum of lambda^exponent over the principal stretches by its series 1, s, h, s h about s = h = 0: differences of
+    values at steps of 1e-40, with 160 digits, so that the stretches need not be distinct."""
+    with mpmath.workdps(160):
+        step = mpmath.mpf(10) ** -40
+        power = mpmath.mpf(sp.Rational(exponent).p) / sp.Rational(exponent).q / 2
+
+        def at(s, h):
+            squares = principal_squares(strain["C"], s * step, h * step)
+            return mpmath.fsum(x**power for x in squares)
+
+        middle, right, left, up, down = at(0, 0), at(1, 0), at(-1, 0), at(0, 1), at(0, -1)
+        corners = at(1, 1) - at(1, -1) - at(-1, 1) + at(-1, -1)
+        series = [middle, (right - left) / (2 * step), (up - down) / (2 * step), corners / (4 * step**2)]
+        middle, by_s, by_h, by_both = [sp.Float(x, 120) for x in series]
+    return middle + by_s * S + by_h * H + by_both * S * H
+
+
+SQUARES = {}
+
+
+def principal_squares(c, s, h):
+    """The eigenvalues of C at a point of the line; those of the last lines are kept, for further exponents."""
+    key = (sp.ImmutableMatrix(c), s, h)
+    if key not in SQUARES:
+        if len(SQUARES) > 100:
+            SQUARES.clear()
+        entries = [[sp.Poly(x, S, H).terms() for x in c.row(i)] for i in range(3)]
+        number = lambda q: mpmath.mpf(sp.Rational(q).p) / sp.Rational(q).q
+        value = lambda terms: mpmath.fsum(number(q) * s**i * h**j for (i, j), q in terms)
+        SQUARES[key] = list(mpmath.eigsy(mpmath.matrix([[value(t) for t in row] for row in entries]), eigvals_only=True))
+    return SQUARES[key]
+
+
 FUNCTIONS = {
+    "stretch_sum": stretch_sum,
     "ln": sp.log,
     "exp": sp.exp,
     "sqrt": sp.sqrt,
@@ -305,6 +346,31 @@ STATES = [
 DIRECTION = matrix([3, -5, 2, 7, 1, -4, -2, 6, 5], 8)
 
 
+def near_equal():
+    """G where two or all three principal stretches differ by a part of them, 1e-2 to 1e-8, or not at all: those with
+    small numbers are exact in f32, those turned are exact in f64."""
+    double = lambda m: m.applyfunc(lambda x: sp.Rational(*float(x).as_integer_ratio()))
+    turn, axes = rotation(1, -2, 3, 5), rotation(4, 1, -3, 2)
+    for digits in [2, 4, 6, 8, None]:
+        for three in [False, True]:
+            gap = sp.Rational(1, 10**digits) if digits else sp.Integer(0)
+            first = sp.Rational(13, 10)
+            last = first * (1 - gap / 2) if three else sp.Rational(7, 10)
+            stretch = axes.T * sp.diag(first, first * (1 + gap), last) * axes
+            yield double(turn * stretch - sp.eye(3))
+            # Off the diagonal f32 has every gap.
+            gap = sp.Rational(1, 2 ** round(digits * 3.3219)) if digits else sp.Integer(0)
+            shear = sp.Matrix(3, 3, [1, 2, 3, 2, -1, 1, 3, 1, 2] if three else [1, 2, 0, 2, -1, 0, 0, 0, 0]) / 4
+            yield sp.diag(1, 1, 1 if three else -1) / 4 + gap * (shear - sp.diag(*shear.diagonal()))
+
+
+def rotation(w, x, y, z):
+    n = sp.Integer(w * w + x * x + y * y + z * z)
+    vector = sp.Matrix([x, y, z])
+    cross = sp.Matrix(3, 3, [0, -z, y, z, 0, -x, -y, x, 0])
+    return ((2 * w * w - n) * sp.eye(3) + 2 * vector * vector.T + 2 * w * cross) / n
+
+
 def materials(law):
     """Two materials, of numbers that are exact in f32, within the declared ranges."""
     for which in range(2):
@@ -317,6 +383,10 @@ def materials(law):
                     "Pa": [sp.Integer(2) ** 20 * (8 + 3 * which + position) / 8],
                     "1": [sp.Rational(5, 16), sp.Rational(31, 64)][which:],
                 }.get(unit, [sp.Integer(1 + which)])
+                if unit == "1":
+                    # Components of an array apart, so that none could take another's place.
+                    wanted = [w + len(row) for w in wanted]
+                wanted = [-w for w in wanted] if high <= 0 else wanted
                 # Nothing usual allowed: near the lower end, in eighths of the range or of one.
                 step = min(high - low, sp.Integer(1)) / 8
                 fallback = sp.Rational(*Fraction(float(low + step * (2 + which + position % 3))).as_integer_ratio())
@@ -332,7 +402,7 @@ def decimal(x, scale):
 
 
 def exact(x):
-    """A dyadic rational in decimal digits, all of them."""
+    """A dyadic rational in decimal digits, all of them; of other rationals forty."""
     return str(sp.Float(x, 40).n(40)).rstrip("0").rstrip(".") if sp.Rational(x).q != 1 else str(sp.Rational(x).p)
 
 
@@ -369,25 +439,30 @@ def main(arguments):
     check = "--check" in arguments
     names = [a for a in arguments if not a.startswith("-")]
     laws = [ROOT / "laws" / f"{n}.rs" for n in names] or sorted((ROOT / "laws").glob("*.rs"))
-    folder = ROOT / "tests/reference/sympy"
-    folder.mkdir(parents=True, exist_ok=True)
     different = []
+
+    def write(kind, name, states):
+        states = [s for s in states if s is not None]
+        text = json.dumps({"law": name, "states": states}, indent=1) + "\n"
+        target = ROOT / "tests/reference" / kind / f"{name}.json"
+        if check:
+            same = target.exists() and target.read_text() == text
+            print(f"{kind} {name}: {len(states)} states, {'the same' if same else 'DIFFERENT from ' + str(target)}")
+            different.extend([] if same else [name])
+        else:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(text)
+            print(f"{kind} {name}: {len(states)} states written")
+
     for path in laws:
         if not names and not (ROOT / "laws/derived" / f"{path.stem}.ir").exists():
             print(f"{path.stem}: not reviewed, skipped")
             continue
         law = Law(path.read_text())
-        states = [values(law, m, g) for m in materials(law) for g in STATES]
-        states = [s for s in states if s is not None]
-        text = json.dumps({"law": path.stem, "states": states}, indent=1) + "\n"
-        target = folder / f"{path.stem}.json"
-        if check:
-            same = target.exists() and target.read_text() == text
-            print(f"{path.stem}: {len(states)} states, {'the same' if same else 'DIFFERENT from ' + str(target)}")
-            different += [] if same else [path.stem]
-        else:
-            target.write_text(text)
-            print(f"{path.stem}: {len(states)} states written")
+        write("sympy", path.stem, [values(law, m, g) for m in materials(law) for g in STATES])
+        if any(token == "stretch_sum" for _, token in law.tokens):
+            source = {name: law.defaults[name] or usual for name, usual in next(materials(law)).items()}
+            write("stretches", path.stem, [values(law, source, g) for g in near_equal()])
     return 1 if different else 0
 
 

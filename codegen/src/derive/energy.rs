@@ -86,6 +86,14 @@ impl<'a> Energy<'a> {
             ScalarNode::Trace(t) => self.trace(t)?,
             ScalarNode::Ddot(a, b) => self.ddot(a, b)?,
             ScalarNode::Det(t) => self.det(t)?,
+            ScalarNode::StretchSum(exponent) => {
+                let exponent = self.scalar(exponent)?;
+                let exponent = self.cas.normalize(&exponent)?;
+                if !self.quantities.is_constant_expr(&exponent) {
+                    return Err(DeriveError::Unsupported("the exponent of `stretch_sum` depends on the strain".into()));
+                }
+                self.strain.stretch_sum(self.cas, self.quantities, exponent)?.into()
+            }
             ScalarNode::Add(a, b) => self.scalar(a)? + self.scalar(b)?,
             ScalarNode::Sub(a, b) => self.scalar(a)? - self.scalar(b)?,
             ScalarNode::Mul(a, b) => self.scalar(a)? * self.scalar(b)?,

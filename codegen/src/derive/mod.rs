@@ -8,6 +8,7 @@
 mod differential;
 mod energy;
 mod rest;
+mod spectral;
 mod strain;
 
 use std::collections::BTreeMap;
@@ -268,9 +269,13 @@ impl Session {
         Ok(stress)
     }
 
-    /// The plain partial derivative of an invariant by one strain component.
+    /// The plain partial derivative of an invariant by one strain component: the given one, where there is one.
     fn partial(&mut self, q: Symbol, component: Symbol) -> Result<Expr, DeriveError> {
         match &self.quantities.get(q).kind {
+            Kind::Stage { partials: Some(partials), .. } => {
+                let given = partials.iter().filter(|(by, _)| *by == component).map(|(_, e)| e.clone());
+                Ok(Expr::Sum(given.collect()))
+            }
             Kind::Stage { value: Value::Expr(e), .. } => Ok(self.cas.derivative(e, component)?),
             _ => Ok(Expr::int(0)),
         }

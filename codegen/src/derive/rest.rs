@@ -2,7 +2,7 @@
 
 use crate::expr::{Expr, Symbol};
 use crate::quantity::{Kind, Value};
-use crate::split::{Leaves, SplitError, Splitter};
+use crate::split::{Leaves, Split, SplitError, Splitter};
 
 use super::strain::{Base, Invariant};
 use super::{DeriveError, Session};
@@ -49,11 +49,20 @@ impl Session {
             let p = self.quantities.stage("p", Expr::from(trace) + second.into());
             leaves.jacobian = Some((j, p, trace, second.into()));
         }
+        let sums = self.strain.near_stretch_sums(&mut self.quantities);
+        if !sums.is_empty() {
+            let trace =
+                self.strain.invariant(&mut self.cas, &mut self.quantities, Invariant::Trace(Base::A))?;
+            for s in sums {
+                let change = Split::given(Expr::int(3), s.change);
+                leaves.others.push((s.sum, change.to_second_order(trace, s.half, s.remainder)));
+            }
+        }
         for (invariant, s) in self.strain.invariants() {
             match invariant {
                 Invariant::Trace(_) => leaves.linear.push(s),
                 Invariant::Ddot(..) | Invariant::Det(_) => leaves.quadratic.push(s),
-                Invariant::J => {}
+                Invariant::J | Invariant::StretchSum(_) => {}
             }
         }
         let energy = self.energy.clone();
@@ -69,7 +78,14 @@ impl Session {
         let jacobian = self.strain.jacobian(&mut self.cas, &mut self.quantities);
         let deformation = *self.strain.deformation();
         let margin = self.margin.clone();
+        let sums = self.strain.near_stretch_sums(&mut self.quantities);
         let mut splitter = Splitter::first(&mut self.cas, &mut self.quantities, &mut self.rest, "force");
+        for s in sums {
+            splitter.give(s.sum, Split::given(Expr::int(3), s.change));
+            for (k, (moment, change)) in s.moment.into_iter().zip(s.moment_change).enumerate() {
+                splitter.give(moment, Split::given(Expr::int(i128::from(k < 3)), change));
+            }
+        }
         let mut near = Vec::new();
         let mut rewritten = false;
         for p in stress {

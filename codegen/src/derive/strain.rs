@@ -11,6 +11,8 @@ use crate::expr::{Expr, Rational, Symbol};
 use crate::ir::Input;
 use crate::quantity::{Kind, Quantities, Value};
 
+use super::spectral::{self, Spectrum};
+
 /// The six components of a symmetric tensor, in the order in which they are stored.
 pub const SYMMETRIC: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
@@ -47,6 +49,8 @@ pub enum Invariant {
     Det(Base),
     /// det F.
     J,
+    /// The sum of the principal stretches to a power, by its number among those in use.
+    StretchSum(usize),
 }
 
 impl Invariant {
@@ -60,9 +64,27 @@ impl Invariant {
         match self {
             Invariant::Trace(b) | Invariant::Det(b) => b == base,
             Invariant::Ddot(a, b) => a == base || b == base,
+            Invariant::StretchSum(_) => base == Base::A,
             Invariant::J => false,
         }
     }
+}
+
+/// T_a = tr C^(a/2), split at rest: T_a = 3 + change = 3 + (a/2) tr A + remainder, M = C^(a/2 - 1) = I + moment_change.
+#[derive(Debug, Clone)]
+pub struct NearStretchSum {
+    /// T_a.
+    pub sum: Symbol,
+    /// a/2.
+    pub half: Expr,
+    /// T_a - 3.
+    pub change: Symbol,
+    /// Its part of second order.
+    pub remainder: Symbol,
+    /// M, six components, by which T_a is differentiated.
+    pub moment: [Symbol; 6],
+    /// M - I.
+    pub moment_change: [Symbol; 6],
 }
 
 /// The kinematic stages of one derivation; a stage exists once something asks for it.
@@ -71,6 +93,11 @@ pub struct Strain {
     deformation: [Symbol; 9],
     bases: BTreeMap<Base, [Symbol; 6]>,
     jacobian: Option<Symbol>,
+    /// The exponents of the sums of principal stretches, and the decomposition that they share.
+    exponents: Vec<Expr>,
+    spectrum: Option<Spectrum>,
+    /// The decomposition for what is split at rest.
+    near_spectrum: Option<Spectrum>,
     invariants: BTreeMap<Invariant, Symbol>,
 }
 
@@ -87,7 +114,16 @@ impl Strain {
         let deformation = std::array::from_fn(|k| {
             if k % 4 == 0 { quantities.stage(name(k, "F"), Expr::int(1) + gradient[k].into()) } else { gradient[k] }
         });
-        Self { gradient, deformation, bases: BTreeMap::new(), jacobian: None, invariants: BTreeMap::new() }
+        Self {
+            gradient,
+            deformation,
+            bases: BTreeMap::new(),
+            jacobian: None,
+            exponents: vec![],
+            spectrum: None,
+            near_spectrum: None,
+            invariants: BTreeMap::new(),
+        }
     }
 
     /// G, row by row.
@@ -179,6 +215,12 @@ impl Strain {
         let label = Base::label;
         let symbol = match invariant {
             Invariant::J => self.jacobian(cas, quantities),
+            Invariant::StretchSum(k) => {
+                let c = self.base(cas, quantities, Base::A)?;
+                let spectrum =
+                    self.spectrum.get_or_insert_with(|| Spectrum::of_deformation(quantities, self.deformation, c));
+                spectrum.stretch_sum(quantities, &self.exponents[k])
+            }
             Invariant::Trace(b) => {
                 let c = self.base(cas, quantities, b)?;
                 quantities.stage(format!("tr{}", label(b)), Expr::Sum(c[..3].iter().map(|&s| s.into()).collect()))
@@ -206,6 +248,39 @@ impl Strain {
         };
         self.invariants.insert(invariant, symbol);
         Ok(symbol)
+    }
+
+    /// The symbol of the sum of the principal stretches to a power that depends on the parameters alone.
+    pub fn stretch_sum(
+        &mut self,
+        cas: &mut Cas,
+        quantities: &mut Quantities,
+        exponent: Expr,
+    ) -> Result<Symbol, UnexpectedTerm> {
+        let k = self.exponents.iter().position(|e| *e == exponent).unwrap_or_else(|| {
+            self.exponents.push(exponent);
+            self.exponents.len() - 1
+        });
+        self.invariant(cas, quantities, Invariant::StretchSum(k))
+    }
+
+    /// The sums of powers of the principal stretches in use, in forms that are split at rest.
+    pub fn near_stretch_sums(&mut self, quantities: &mut Quantities) -> Vec<NearStretchSum> {
+        let (Some(spectrum), Some(strain)) = (&self.spectrum, self.bases.get(&Base::A)) else { return vec![] };
+        let near = self.near_spectrum.get_or_insert_with(|| Spectrum::near_rest(quantities, *strain));
+        let mut sums = Vec::new();
+        for (k, exponent) in self.exponents.iter().enumerate() {
+            let Some(&sum) = self.invariants.get(&Invariant::StretchSum(k)) else { continue };
+            sums.push(NearStretchSum {
+                sum,
+                half: spectral::half(exponent),
+                change: near.first_order(quantities, exponent),
+                remainder: near.second_order(quantities, exponent),
+                moment: spectrum.moment(k),
+                moment_change: near.moment_from_rest(quantities, exponent),
+            });
+        }
+        sums
     }
 
     /// The derivatives of a strain component or of J by the components of G, as (3 i + j, derivative).

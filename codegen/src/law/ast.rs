@@ -99,6 +99,9 @@ pub enum ScalarNode {
     Ddot(Tensor, Tensor),
     /// det A.
     Det(Tensor),
+    /// lambda_1^a + lambda_2^a + lambda_3^a = tr C^(a/2): the sum of powers of the principal stretches (a is a number
+    /// or a function of the parameters).
+    StretchSum(Scalar),
     /// a + b.
     Add(Scalar, Scalar),
     /// a - b.

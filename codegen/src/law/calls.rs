@@ -1,14 +1,17 @@
 //! Calls: built-in functions, methods of scalars, sums, and helper functions of the law file.
 
+use std::rc::Rc;
+
 use proc_macro2::Span;
 use syn::punctuated::Punctuated;
 use syn::spanned::Spanned;
 use syn::{BinOp, Expr, ExprCall, ExprMethodCall, RangeLimits, Token};
 
 use super::ast::{ScalarNode, TensorNode};
+use super::dimension::Dimension;
 use super::expr::{Lowering, Scope};
 use super::functions::{ArgumentType, is_energy, plain_name};
-use super::interval::Interval;
+use super::interval::{Interval, Values};
 use super::value::{Integer, IntegerType, ScalarValue, TensorValue, Value};
 use super::words;
 
@@ -42,6 +45,9 @@ impl Lowering<'_> {
             None if words::unsupported(&name) => {
                 let reason = format!("`{name}` (fibres and principal stretches) is not supported by this version");
                 self.broken(span, reason, words::suggest("", words::FUNCTIONS, "the functions are"))
+            }
+            None if let Some(remedy) = words::stretch_remedy(&name) => {
+                self.broken(span, format!("unknown function `{name}`"), remedy)
             }
             None => {
                 let own: Vec<String> = self.functions.keys().map(|name| format!("{name}(..)")).collect();
@@ -188,13 +194,16 @@ impl Lowering<'_> {
         let receiver = match self.expr(&call.receiver, scope) {
             Value::Scalar(scalar) => scalar,
             Value::Broken => return Value::Broken,
+            Value::Strain if name == "stretch_sum" => return self.stretch_sum(call, scope),
             Value::Strain => {
-                let remedy = if words::STRAIN.contains(&name.as_str()) {
+                let remedy = if let Some(remedy) = words::stretch_remedy(&name) {
+                    remedy.to_owned()
+                } else if words::STRAIN.contains(&name.as_str()) {
                     format!("write `s.{name}` without the brackets")
                 } else {
                     words::suggest(&name, words::STRAIN, "take a field of it:")
                 };
-                return self.broken(span, "the strain has fields, not methods", remedy);
+                return self.broken(span, format!("the strain has no method `{name}`"), remedy);
             }
             Value::Parameters => {
                 let remedy = "write `p.name` without brackets, and `*` for a product";
@@ -235,6 +244,33 @@ impl Lowering<'_> {
             }
             _ => self.scalar_function(&name, span, &[receiver], &[call.receiver.span()]),
         }
+    }
+
+    /// `s.stretch_sum(a)`.
+    fn stretch_sum(&mut self, call: &ExprMethodCall, scope: &Scope) -> Value {
+        let (name, usage) = ("stretch_sum", words::STRAIN_METHODS[0]);
+        if let Some(turbofish) = &call.turbofish {
+            return self.broken(turbofish.span(), "methods of a law have no generics", format!("write `s.{usage}`"));
+        }
+        if call.args.len() != words::arity(usage) {
+            let usage = format!("s.{usage}");
+            return self.wrong_count(name, call.method.span(), &usage, 1, call.args.len());
+        }
+        let span = call.args[0].span();
+        let Some(exponent) = self.scalar(&call.args[0], scope) else { return Value::Broken };
+        if exponent.facts.strain {
+            let remedy = "give it a number, or an expression in the parameters";
+            return self.broken(span, "the exponent of `stretch_sum` depends on the strain", remedy);
+        }
+        if exponent.is_zero() {
+            let reason = "the exponent of `stretch_sum` is zero: the sum is 3, whatever the strain";
+            return self.broken(span, reason, "write the number 3.0, or another exponent");
+        }
+        self.pure("the exponent of `stretch_sum` is", exponent.facts.dimension, span);
+        let node = ScalarNode::StretchSum(Rc::clone(&exponent.node));
+        let mut value = ScalarValue::over(node, &[exponent.facts], Some(Dimension::ONE), Values::of_stretch_sum());
+        value.facts.strain = true;
+        Value::Scalar(value)
     }
 
     /// `select(a > b, x, y)`, for all four comparisons by the one that the tree has.

@@ -168,6 +168,11 @@ impl Values {
         }
     }
 
+    /// The values of a sum of powers of the principal stretches.
+    pub(super) fn of_stretch_sum() -> Values {
+        Values { anywhere: Interval::NON_NEGATIVE, upright: Interval::POSITIVE }
+    }
+
     /// A function of the values.
     pub(super) fn map(self, f: impl Fn(Interval) -> Interval) -> Values {
         Values { anywhere: f(self.anywhere), upright: f(self.upright) }

@@ -17,6 +17,9 @@ impl Lowering<'_> {
             return value;
         }
         let intro = "the strain offers";
+        if let Some(remedy) = words::stretch_remedy(name) {
+            return self.broken(span, format!("the strain has no field `{name}`"), remedy);
+        }
         if words::unsupported(name) {
             let reason = format!("`{name}` (fibres and principal stretches) is not supported by this version");
             return self.broken(span, reason, words::suggest("", words::STRAIN, intro));

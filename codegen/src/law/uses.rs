@@ -70,6 +70,7 @@ impl Uses {
                 self.scalar(b);
             }
             ScalarNode::Neg(a)
+            | ScalarNode::StretchSum(a)
             | ScalarNode::Powi(a, _)
             | ScalarNode::Ln(a)
             | ScalarNode::Exp(a)

@@ -3,6 +3,9 @@
 /// What the `Strain` argument offers.
 pub(super) const STRAIN: &[&str] = &["eps", "E", "C", "I1", "I2", "I3", "J", "I1bar", "I2bar"];
 
+/// Methods of the `Strain` argument, as they are called.
+pub(super) const STRAIN_METHODS: &[&str] = &["stretch_sum(a)"];
+
 /// Methods of a scalar, as they are called.
 pub(super) const METHODS: &[&str] = &["powi(n)", "powf(a)", "ln()", "exp()", "sqrt()"];
 
@@ -40,13 +43,20 @@ pub(super) fn function(name: &str) -> Option<&'static str> {
     FUNCTIONS.iter().copied().find(|usage| bare(usage) == name)
 }
 
-/// Names that other laws need and that this version does not have: fibres and principal stretches.
+/// Names that other laws need and that this version does not have: fibres.
 pub(super) fn unsupported(name: &str) -> bool {
     let lower = name.to_ascii_lowercase();
     let fibre_invariant = lower.strip_prefix('i').and_then(|rest| rest.chars().next()).is_some_and(|c| {
         ('4'..='8').contains(&c) && lower.chars().skip(2).all(|c| c.is_ascii_digit() || c == '_' || "bar".contains(c))
     });
-    fibre_invariant || ["fibre", "fiber", "stretch", "direction"].iter().any(|word| lower.contains(word))
+    fibre_invariant || ["fibre", "fiber", "direction"].iter().any(|word| lower.contains(word))
+}
+
+/// The remedy for a name of principal stretches that the language does not have: the one form that it has.
+pub(super) fn stretch_remedy(name: &str) -> Option<&'static str> {
+    name.to_ascii_lowercase()
+        .contains("stretch")
+        .then_some("write `s.stretch_sum(a)`, the sum of the principal stretches to the power a")
 }
 
 /// Names from elsewhere, with ours.

@@ -79,6 +79,17 @@ impl Split {
     fn is_constant(&self) -> bool {
         self.change.is_zero()
     }
+
+    /// A value whose constant at rest and change are known.
+    pub fn given(rest: Expr, change: Symbol) -> Self {
+        let value = rest.clone() + change.into();
+        Self { rest, change: change.into(), value, rewritten: (true, true), second: None }
+    }
+
+    /// With its change to second order: `coefficient` times a linear invariant, and the remainder.
+    pub fn to_second_order(self, invariant: Symbol, coefficient: Expr, remainder: Symbol) -> Self {
+        Self { second: Some(Second::known(invariant, coefficient, remainder)), ..self }
+    }
 }
 
 /// What the kernels of one derivation share: known constants, and the rewrites for the reader.
@@ -140,6 +151,11 @@ impl<'a> Splitter<'a> {
             Expr::Exp(a) => self.exp(e, a),
             Expr::Log1p(_) | Expr::Expm1(_) | Expr::Log1pmx(_) | Expr::Expm1mx(_) => Ok(self.opaque(e.clone())),
         }
+    }
+
+    /// Ends the splitting at a quantity whose split is known.
+    pub fn give(&mut self, s: Symbol, split: Split) {
+        self.known.insert(s, split);
     }
 
     /// Whether the quantity took part in what was split so far.

@@ -34,6 +34,16 @@ impl Second {
         Self { linear: BTreeMap::new(), remainder: change, order: 2, is_whole: true }
     }
 
+    /// A change that is known.
+    pub(super) fn known(invariant: Symbol, coefficient: Expr, remainder: Symbol) -> Self {
+        Self {
+            linear: BTreeMap::from([(invariant, coefficient)]),
+            remainder: remainder.into(),
+            order: 2,
+            is_whole: false,
+        }
+    }
+
     /// A change of first order that is no linear form.
     pub(super) fn of_first_order(change: Expr) -> Self {
         Self { order: 1, ..Self::whole(change) }

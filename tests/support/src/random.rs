@@ -57,7 +57,7 @@ impl Rng {
     }
 
     /// Parameters within the declared ranges, of ordinary size where the range allows: stresses between 1e5 and 1e7 Pa,
-    /// pure numbers between -0.4 and 0.45.
+    /// pure numbers between -0.4 and 0.45; mirrored where only negative ones are allowed.
     pub fn parameters(&mut self, info: &LawInfo) -> Vec<f64> {
         let mut all = vec![];
         for p in info.parameters {
@@ -66,6 +66,7 @@ impl Rng {
                 "1" => (-0.4, 0.45),
                 _ => (1.0, 2.0),
             };
+            let usual = if p.range.1 <= 0.0 { (-usual.1, -usual.0) } else { usual };
             let (mut low, mut high) = (usual.0.max(p.range.0), usual.1.min(p.range.1));
             if low >= high {
                 // Nothing usual is allowed: the part of the range that is nearest to it.
