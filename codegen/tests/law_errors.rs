@@ -2,7 +2,7 @@
 //!
 //! The cases are the files of `law_errors/`: `==== KIND`, a text, `----`, the message. KIND says what the text is:
 //! a `file`, a file but for its doc comment (`documented`), the functions and constants below the struct (`items`),
-//! or the body of the energy (`energy`).
+//! or the body of the energy (`energy`), also of a law with a fibre direction `a` (`fibres`).
 
 use std::path::{Path, PathBuf};
 
@@ -10,6 +10,8 @@ use tensormass_codegen::law::{LawError, parse};
 
 const DOCS: &str = "//! Test law.\n";
 const STRUCT: &str = "struct Parameters {\n    /// Stiffness.\n    #[unit(\"Pa\")] #[range(0.0, 1e9)] mu: f64,\n}\n";
+const FIBRES: &str = "struct Parameters {\n    /// Stiffness.\n    #[unit(\"Pa\")] #[range(0.0, 1e9)] mu: f64,\n    \
+                      /// Fibres.\n    a: Direction,\n}\n";
 const SIGNATURE: &str = "fn energy_density(s: Strain, p: Parameters) -> f64 {\n    ";
 
 fn folder(name: &str) -> PathBuf {
@@ -54,6 +56,7 @@ fn every_wrong_file_has_its_message() {
                 "file" => text.to_owned(),
                 "documented" => format!("{DOCS}{text}"),
                 "items" => format!("{DOCS}{STRUCT}{text}"),
+                "fibres" => format!("{DOCS}{FIBRES}{SIGNATURE}{text}\n}}\n"),
                 "energy" => format!("{DOCS}{STRUCT}{SIGNATURE}{text}\n}}\n"),
                 _ => panic!("{name}: unknown kind {kind}"),
             };

@@ -104,8 +104,9 @@ class Law:
                 self.next("f64"), self.next(";")
                 length = int(self.next())
                 self.next("]")
-            else:
-                self.next("f64")
+            elif self.next() == "Direction":
+                bounds, length = (-1, 1), 3
+                unit = "direction"
             self.accept(",")
             self.parameters.append((name, unit, bounds, length))
 
@@ -190,7 +191,11 @@ class Law:
             if self.peek() == ".":
                 self.next()
                 name = self.next()
-                value = FUNCTIONS[name](value, *self.arguments(scope, ")")) if self.accept("(") else value[name]
+                if self.accept("("):
+                    function = FIBRES[name] if name in FIBRES else FUNCTIONS[name]
+                    value = function(value, *self.arguments(scope, ")"))
+                else:
+                    value = value[name]
             elif self.accept("["):
                 value = value[int(self.expression(scope))]
                 self.next("]")
@@ -270,6 +275,21 @@ FUNCTIONS = {
 }
 
 
+def between(a, c, b):
+    """a . c . b"""
+    return (sp.Matrix([a]) * c * sp.Matrix(b))[0]
+
+
+# The strain's methods.
+FIBRES = {
+    "I4": lambda s, a: between(a, s["C"], a),
+    "I5": lambda s, a: between(a, s["C"] ** 2, a),
+    "I8": lambda s, a, b: between(a, s["C"], b),
+    "I4bar": lambda s, a: between(a, s["C"], a) * s["J"] ** sp.Rational(-2, 3),
+    "I5bar": lambda s, a: between(a, s["C"] ** 2, a) * s["J"] ** sp.Rational(-4, 3),
+}
+
+
 def strain(g):
     f = sp.eye(3) + g
     c = f.T * f
@@ -305,11 +325,19 @@ STATES = [
 DIRECTION = matrix([3, -5, 2, 7, 1, -4, -2, 6, 5], 8)
 
 
+# Unit vectors with rational components.
+DIRECTIONS = [[sp.Rational(n, d) for n in v] for *v, d in [(2, -1, 2, 3), (3, 6, -2, 7), (-6, 2, 9, 11), (1, 8, 4, 9)]]
+
+
 def materials(law):
-    """Two materials, of numbers that are exact in f32, within the declared ranges."""
+    """Two materials within the declared ranges: numbers that are exact in f32, and unit vectors."""
     for which in range(2):
-        values, position = {}, 0
+        values, position, directions = {}, 0, 0
         for name, unit, (low, high), length in law.parameters:
+            if unit == "direction":
+                values[name] = DIRECTIONS[(2 * which + directions) % len(DIRECTIONS)]
+                directions += 1
+                continue
             row = []
             for _ in range(length or 1):
                 position += 1

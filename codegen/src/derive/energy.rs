@@ -12,7 +12,7 @@ use crate::law::ast::{self, Law, Scalar, ScalarNode, Tensor, TensorNode};
 use crate::quantity::{Kind, Quantities, Value};
 
 use super::DeriveError;
-use super::strain::{Base, Invariant, Strain};
+use super::strain::{Base, Direction, Invariant, Strain};
 
 /// A named value with more nodes than this becomes a stage of its own instead of being repeated where it is used.
 const INLINE_NODES: usize = 24;
@@ -119,6 +119,11 @@ impl<'a> Energy<'a> {
         Ok(self.strain.invariant(self.cas, self.quantities, invariant)?.into())
     }
 
+    /// The components of a direction, by its parameter.
+    fn direction(&self, parameter: usize) -> Direction {
+        std::array::from_fn(|k| self.parameters[parameter][k])
+    }
+
     fn invariant(&mut self, i: ast::Invariant) -> Result<Expr, DeriveError> {
         let c: Tensor = Rc::new(TensorNode::C);
         let two = Rational::from_integer(2);
@@ -135,6 +140,24 @@ impl<'a> Energy<'a> {
             }
             ast::Invariant::I2bar => {
                 self.basic(Invariant::J)?.pow(Rational::new(-4, 3)) * self.invariant(ast::Invariant::I2)?
+            }
+            ast::Invariant::I4(a) => Expr::int(1) + self.basic(Invariant::Fibre(self.direction(a)))?,
+            ast::Invariant::I5(a) => {
+                let a = self.direction(a);
+                let linear = self.basic(Invariant::Fibre(a))?;
+                Expr::Sum(vec![Expr::int(1), Expr::int(2) * linear, self.basic(Invariant::FibreSquare(a))?])
+            }
+            ast::Invariant::I8(a, b) => {
+                let (a, b) = (self.direction(a), self.direction(b));
+                let cosine = Expr::Sum(a.iter().zip(&b).map(|(&x, &y)| Expr::from(x) * y.into()).collect());
+                let cosine = self.quantity("cosine", Value::Expr(cosine));
+                cosine + self.basic(Invariant::FibrePair(a, b))?
+            }
+            ast::Invariant::I4bar(a) => {
+                self.basic(Invariant::J)?.pow(Rational::new(-2, 3)) * self.invariant(ast::Invariant::I4(a))?
+            }
+            ast::Invariant::I5bar(a) => {
+                self.basic(Invariant::J)?.pow(Rational::new(-4, 3)) * self.invariant(ast::Invariant::I5(a))?
             }
         })
     }

@@ -11,6 +11,8 @@ use crate::expr::{Expr, Rational, Symbol};
 use crate::ir::Input;
 use crate::quantity::{Kind, Quantities, Value};
 
+use super::fibre;
+
 /// The six components of a symmetric tensor, in the order in which they are stored.
 pub const SYMMETRIC: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
@@ -34,7 +36,16 @@ pub enum Invariant {
     Det(Base),
     /// det F.
     J,
+    /// a . A . a of a direction a.
+    Fibre(Direction),
+    /// a . A^2 . a.
+    FibreSquare(Direction),
+    /// a . A . b of two directions.
+    FibrePair(Direction, Direction),
 }
+
+/// The components of a unit vector of the body at rest: parameters, hence constants of the material.
+pub type Direction = [Symbol; 3];
 
 impl Invariant {
     /// The base over which S = dW/dE is collected.
@@ -48,7 +59,13 @@ impl Invariant {
             Invariant::Trace(b) | Invariant::Det(b) => b == base,
             Invariant::Ddot(a, b) => a == base || b == base,
             Invariant::J => false,
+            Invariant::Fibre(_) | Invariant::FibreSquare(_) | Invariant::FibrePair(..) => base == Base::A,
         }
+    }
+
+    /// Whether the invariant is made with a direction.
+    pub fn is_fibre(self) -> bool {
+        matches!(self, Invariant::Fibre(_) | Invariant::FibreSquare(_) | Invariant::FibrePair(..))
     }
 }
 
@@ -164,6 +181,18 @@ impl Strain {
         let label = |b: Base| if b == Base::A { "A" } else { "eps" };
         let symbol = match invariant {
             Invariant::J => self.jacobian(cas, quantities),
+            Invariant::Fibre(d) => {
+                let c = self.base(cas, quantities, Base::A)?;
+                fibre::pair(quantities, &c, d, d)
+            }
+            Invariant::FibrePair(d, e) => {
+                let c = self.base(cas, quantities, Base::A)?;
+                fibre::pair(quantities, &c, d, e)
+            }
+            Invariant::FibreSquare(d) => {
+                let c = self.base(cas, quantities, Base::A)?;
+                fibre::square(quantities, &c, d)
+            }
             Invariant::Trace(b) => {
                 let c = self.base(cas, quantities, b)?;
                 quantities.stage(format!("tr{}", label(b)), Expr::Sum(c[..3].iter().map(|&s| s.into()).collect()))

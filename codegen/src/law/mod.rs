@@ -6,6 +6,7 @@ mod brackets;
 mod calls;
 mod error;
 mod expr;
+mod fibres;
 mod functions;
 mod limits;
 mod literals;
