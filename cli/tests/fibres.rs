@@ -57,7 +57,7 @@ impl State {
 
     /// W, with the value of the term.
     fn energy(&self, term: f64) -> f64 {
-        let e = |k: usize| 0.5 * (self.c[k / 3][k % 3] - f64::from(u8::from(k % 4 == 0)));
+        let e = |k: usize| 0.5 * (self.c[k / 3][k % 3] - f64::from(u8::from(k.is_multiple_of(4))));
         let families = self.between(A, 1, A) - self.between(B, 1, B);
         MU * (0..9).map(|k| e(k) * e(k)).sum::<f64>() + MU * families.powi(2) + MU * term
     }
