@@ -48,20 +48,30 @@ impl Case {
         (0..left.len()).map(compare).collect()
     }
 
+    /// Whether a selection changes its branch between the states that a difference in direction D samples: across such a
+    /// kink a difference is no derivative.
+    fn crosses_a_kink(&self, d: &[f64; 9]) -> bool {
+        let branches = |h: f64| self.point.branches(&moved(&self.g, h, d));
+        let here = branches(0.0);
+        STEPS.iter().any(|h| branches(*h) != here || branches(-h) != here)
+    }
+
     /// The law is invariant under rotations of the deformed body; the small strain is not.
     fn objective(&self) -> bool {
         !self.point.entry.info.small_strain
     }
 }
 
+/// The steps of differences.
+const STEPS: [f64; 4] = [1.0 / 128.0, 1.0 / 256.0, 1.0 / 512.0, 1.0 / 1024.0];
+
 /// Central differences with steps h, h/2, h/4, h/8, extrapolated (Romberg): the error is O(h^8), and the difference to
 /// the extrapolation one order lower bounds it.
 fn derivative<const N: usize>(f: impl Fn(f64) -> [Rounded; N]) -> [(Rounded, f64); N] {
-    let steps = [1.0 / 128.0, 1.0 / 256.0, 1.0 / 512.0, 1.0 / 1024.0];
-    let samples = steps.map(|h| (f(h), f(-h)));
+    let samples = STEPS.map(|h| (f(h), f(-h)));
     std::array::from_fn(|k| {
         let mut column: Vec<Rounded> =
-            (0..4).map(|i| (samples[i].0[k] - samples[i].1[k]) * Rounded::exact(0.5 / steps[i])).collect();
+            (0..4).map(|i| (samples[i].0[k] - samples[i].1[k]) * Rounded::exact(0.5 / STEPS[i])).collect();
         let mut lower = column[3];
         for order in 1..4 {
             lower = *column.last().expect("one column a level");
@@ -82,6 +92,9 @@ fn moved(g: &[f64; 9], h: f64, d: &[f64; 9]) -> Matrix {
 
 fn stress_is_derivative_of_energy(case: &mut Case) -> Vec<Comparison> {
     let d = case.rng.direction();
+    if case.crosses_a_kink(&d) {
+        return vec![];
+    }
     let [(difference, truncation)] = derivative(|h| [case.point.energy(&moved(&case.g, h, &d))]);
     let p = case.point.force(&exact(&case.g));
     let scale = magnitude(&p);
@@ -93,6 +106,9 @@ fn stress_is_derivative_of_energy(case: &mut Case) -> Vec<Comparison> {
 
 fn increment_is_derivative_of_stress(case: &mut Case) -> Vec<Comparison> {
     let d = case.rng.direction();
+    if case.crosses_a_kink(&d) {
+        return vec![];
+    }
     let differences = derivative(|h| case.point.force(&moved(&case.g, h, &d)));
     let increment = case.point.dforce(&exact(&case.g), &exact(&d));
     let mut all = case.same("differences of P against dP", &differences.map(|x| x.0), &increment);
@@ -159,14 +175,30 @@ fn energy_and_stress_turn_with_the_body(case: &mut Case) -> Vec<Comparison> {
     all
 }
 
-/// No direction is preferred: W(Q' F Q) = W(F). Stated so, it holds for small strains too.
-fn directions_are_alike(case: &mut Case) -> Vec<Comparison> {
+/// The material's parameters with its fibre directions turned: a becomes Q' a. A law without any keeps its own.
+fn turned(point: &Point, q: &Matrix) -> Point {
+    let mut parameters = point.rounded.clone();
+    let mut first = 0;
+    for p in point.entry.info.parameters {
+        if p.direction {
+            let a: [Rounded; 3] = std::array::from_fn(|k| parameters[first + k]);
+            for k in 0..3 {
+                parameters[first + k] = (0..3).map(|i| q[3 * i + k] * a[i]).sum();
+            }
+        }
+        first += p.len;
+    }
+    Point::of(point.derivation.clone(), point.entry, parameters)
+}
+
+/// No direction is preferred but the fibres': W(Q' F Q; Q' a) = W(F; a). Stated so, it holds for small strains too.
+fn only_fibres_are_preferred(case: &mut Case) -> Vec<Comparison> {
     let q = rotation(case.rng.quaternion());
     let g = exact(&case.g);
     let conjugate = |a: &Matrix| product(&transpose(&q), &product(a, &q));
-    let point = &case.point;
-    let mut all = case.same("W(Q'FQ)", &[point.energy(&conjugate(&g))], &[point.energy(&g)]);
-    all.extend(case.same("P(Q'FQ) = Q' P Q", &point.force(&conjugate(&g)), &conjugate(&point.force(&g))));
+    let (point, turned) = (&case.point, turned(&case.point, &q));
+    let mut all = case.same("W(Q'FQ; Q'a)", &[turned.energy(&conjugate(&g))], &[point.energy(&g)]);
+    all.extend(case.same("P(Q'FQ; Q'a) = Q' P Q", &turned.force(&conjugate(&g)), &conjugate(&point.force(&g))));
     all
 }
 
@@ -239,24 +271,27 @@ fn domain_is_reported(case: &mut Case) -> Vec<Comparison> {
 fn check(property: fn(&mut Case) -> Vec<Comparison>) {
     for entry in laws() {
         let name = entry.info.name;
-        // Differences across a `select`'s kink are no derivative: there the tolerance may become useless.
-        let kinks = entry.info.operations.iter().any(|o| o.selects > 0);
+        let mut compared = 0;
         for seed in 0..STATES {
             let mut rng = Rng::new(seed);
             let point = Point::new(env!("TENSORMASS_GENERATED"), entry, rng.parameters(entry.info));
             let g = point.state(&mut rng, STRETCHES);
             let mut case = Case { point, rng, g };
-            for c in property(&mut case) {
+            let comparisons = property(&mut case);
+            compared += usize::from(!comparisons.is_empty());
+            for c in comparisons {
                 let context = format!("{name}, seed {seed}, parameters {:?}, G {g:?}", case.point.parameters);
                 let Comparison { what, left, right, tolerance, magnitude } = c;
                 let difference = (left - right).abs();
                 assert!(difference <= tolerance, "{what}: {left} against {right}, tolerance {tolerance:e}; {context}");
                 assert!(
-                    kinks || tolerance <= USEFUL * magnitude,
+                    tolerance <= USEFUL * magnitude,
                     "{what}: the tolerance {tolerance:e} proves nothing about {magnitude:e}; {context}"
                 );
             }
         }
+        // Some properties are not every law's; some states have a kink nearby.
+        assert!(compared == 0 || 2 * compared > STATES as usize, "{name}: {compared} of {STATES} states were compared");
     }
 }
 
@@ -270,7 +305,7 @@ properties!(
     diagonal_is_tangent,
     rest_is_free_of_stress,
     energy_and_stress_turn_with_the_body,
-    directions_are_alike,
+    only_fibres_are_preferred,
     cauchy_stress_is_p_f_over_j,
     single_precision_is_double_rounded,
     domain_is_reported,

@@ -34,7 +34,7 @@ fn check(law: &'static LawEntry, seed: u64, stretch: (f64, f64)) {
         g[8] = -2.0 - g[8];
     }
     let d = rng.direction();
-    let parameters: Vec<_> = point.parameters.iter().map(|&p| prelude::seeded(p, 0.0, 0.0)).collect();
+    let parameters: Vec<_> = point.rounded.iter().map(|&p| prelude::parameter(p)).collect();
     let (p, dp) = (point.force(&exact(&g)), point.dforce(&exact(&g), &exact(&d)));
     // W counts from rest: its value there has no meaning.
     let at_rest = energy(prelude::Strain::of([prelude::seeded(0.0, 0.0, 0.0); 9]), &parameters).x;

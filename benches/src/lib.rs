@@ -6,7 +6,9 @@ use tensormass_runtime::{LawInfo, ParameterInfo};
 /// given.
 pub fn beam(info: &LawInfo, cells: [u32; 3]) -> String {
     let parameter = |p: &ParameterInfo| {
-        let value = p.default.map_or_else(|| middle(p.range), |d| d[0]);
+        // The middle of a direction's components would be none.
+        let middle = if p.direction { 1.0 } else { middle(p.range) };
+        let value = p.default.map_or(middle, |d| d[0]);
         let text = if p.len == 1 { format!("{value:?}") } else { format!("{:?}", vec![value; p.len]) };
         format!("{} = {text}", p.name)
     };

@@ -125,9 +125,38 @@ fn show_gives_units_ranges_and_structure() {
     assert_eq!(poisson["range"], serde_json::json!([-0.9, 0.4999]));
     assert_eq!((text(poisson, "unit"), &poisson["default"]), ("1", &Value::Null));
     assert_eq!(law["domain"], "J > 0.0");
-    assert_eq!(law["structure"], serde_json::json!({"linear": false, "uses_j": true, "polynomial": false}));
+    let structure = serde_json::json!({
+        "linear": false, "isotropic": true, "uses_j": true, "uses_fibres": false, "polynomial": false
+    });
+    assert_eq!(law["structure"], structure);
     assert_eq!(json(&["law", "show", "hooke", "--json"])["structure"]["linear"], true);
     assert!(succeed(&["law", "show", "neo_hookean"]).contains("1 to 1e12"));
+}
+
+#[test]
+fn show_tells_directions_from_arrays() {
+    let mut found = 0;
+    for law in laws() {
+        let name = text(&law, "name");
+        let page = succeed(&["law", "show", name]);
+        let parameters = law["parameters"].as_array().expect("an array");
+        let direction = |p: &&Value| p["direction"] == true;
+        for p in parameters.iter().filter(direction) {
+            let line = page.lines().find(|l| l.trim().starts_with(text(p, "name"))).expect("a line a parameter");
+            assert!(line.contains(" direction ") && !line.contains('['), "{name}: {line}");
+            assert_eq!(p["components"], 3, "{name}");
+            found += 1;
+        }
+        let uses = parameters.iter().any(|p| direction(&p));
+        assert_eq!(law["structure"]["uses_fibres"], uses, "{name}");
+        let says = |fact: &str, yes: bool| {
+            let line = page.lines().find(|l| l.starts_with(fact)).unwrap_or_else(|| panic!("{name}: no `{fact}`"));
+            assert!(line.ends_with(if yes { "yes" } else { "no" }), "{name}: {line}");
+        };
+        says("uses fibres", uses);
+        says("isotropic", !uses);
+    }
+    assert!(found > 0, "no law of this build has a direction");
 }
 
 #[test]

@@ -32,6 +32,11 @@ pub fn module(text: &str) -> Result<String, syn::Error> {
                         let length: usize = syn::parse2::<syn::LitInt>(quote!(#length))?.base10_parse()?;
                         fields.push(quote!(#name: ::std::array::from_fn(|i| parameters[#components + i])));
                         components += length;
+                    } else if matches!(&field.ty, syn::Type::Path(p) if p.path.is_ident("Direction")) {
+                        let at = components..components + 3;
+                        let at = at.map(|k| quote!(parameters[#k]));
+                        fields.push(quote!(#name: Direction([#(#at),*])));
+                        components += 3;
                     } else {
                         fields.push(quote!(#name: parameters[#components]));
                         components += 1;
@@ -79,7 +84,7 @@ pub fn module(text: &str) -> Result<String, syn::Error> {
 }
 
 /// One module a law, and the table of their names and `oracle` functions. `super::prelude` is the includer's: `Number`
-/// (the number type), `Strain` and the functions of the law language.
+/// (the number type), `Strain`, `Direction` (three numbers) and the functions of the law language.
 ///
 /// # Errors
 /// A defect of this printer.

@@ -2,7 +2,8 @@
 //!
 //! The cases are the files of `law_errors/`: `==== KIND`, a text, `----`, the message. KIND says what the text is:
 //! a `file`, a file but for its doc comment (`documented`), the functions and constants below the struct (`items`),
-//! or the body of the energy, of one parameter mu (`energy`) or of mu, kappa and n (`moduli`). With UPDATE=1 the messages are written instead of compared, for review.
+//! or the body of the energy, of one parameter mu (`energy`), of mu, kappa and n (`moduli`), or of mu and a fibre direction a
+//! (`fibres`). With UPDATE=1 the messages are written instead of compared, for review.
 
 use std::path::{Path, PathBuf};
 
@@ -13,6 +14,8 @@ const STRUCT: &str = "struct Parameters {\n    /// Stiffness.\n    #[unit(\"Pa\"
 const MODULI: &str = "struct Parameters {\n    /// Shear modulus.\n    #[unit(\"Pa\")] #[range(0.0, 1e9)] mu: f64,\n    \
                       /// Bulk modulus.\n    #[unit(\"Pa\")] #[range(0.0, 1e9)] kappa: f64,\n    \
                       /// A pure number.\n    #[unit(\"1\")] #[range(1.0, 2.0)] n: f64,\n}\n";
+const FIBRES: &str = "struct Parameters {\n    /// Stiffness.\n    #[unit(\"Pa\")] #[range(0.0, 1e9)] mu: f64,\n    \
+                      /// Fibres.\n    a: Direction,\n}\n";
 const SIGNATURE: &str = "fn energy_density(s: Strain, p: Parameters) -> f64 {\n    ";
 
 fn folder(name: &str) -> PathBuf {
@@ -52,6 +55,7 @@ fn check(name: &str, text: &str, update: bool) -> (String, usize) {
             "documented" => format!("{DOCS}{text}"),
             "items" => format!("{DOCS}{STRUCT}{text}"),
             "energy" => format!("{DOCS}{STRUCT}{SIGNATURE}{text}\n}}\n"),
+            "fibres" => format!("{DOCS}{FIBRES}{SIGNATURE}{text}\n}}\n"),
             "moduli" => format!("{DOCS}{MODULI}{SIGNATURE}{text}\n}}\n"),
             _ => panic!("{name}: unknown kind {kind}"),
         };

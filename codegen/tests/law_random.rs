@@ -250,7 +250,7 @@ fn file(values: &[Tree]) -> String {
         text += &format!("    let x{k} = {};\n", value.text(k).0);
     }
     // All parameters are used, whatever was drawn.
-    text + &format!("    p.c * s.I1 * x{} + p.a * p.b[0] * p.b[1] * p.c\n}}\n", values.len() - 1)
+    text + format!("    p.c * s.I1 * x{} + p.a * p.b[0] * p.b[1] * p.c\n}}\n", values.len() - 1).as_str()
 }
 
 fn runner(cases: u32) -> TestRunner {

@@ -15,6 +15,7 @@ fn literals_constants_and_casts_are_rewritten() {
          const B: f64 = A / 4.0;\n\
          #[domain(J > 0.0)] struct Parameters {\n\
          /// One.\n #[unit(\"Pa\")] #[range(0.0, 1.0)] c: [f64; 3],\n\
+         /// Fibres.\n #[per_element] f: Direction,\n\
          /// Two.\n #[unit(\"1\")] #[range(0.0, 1.0)] a: f64 }\n\
          fn one() -> f64 { 1.0 }\n\
          fn energy_density_x(s: Strain, p: Parameters) -> f64 {\n\
@@ -32,6 +33,7 @@ fn B() -> f64 {
 #[derive(Clone, Copy)]
 struct Parameters {
     c: [f64; 3],
+    f: Direction,
     a: f64,
 }
 fn one() -> f64 {
@@ -49,7 +51,8 @@ fn energy_density_y(s: Strain, p: Parameters) -> f64 {
 pub fn oracle(strain: Strain, parameters: &[f64]) -> f64 {
     let parameters = Parameters {
         c: ::std::array::from_fn(|i| parameters[0usize + i]),
-        a: parameters[3usize],
+        f: Direction([parameters[3usize], parameters[4usize], parameters[5usize]]),
+        a: parameters[6usize],
     };
     energy_density_x(strain, parameters) + energy_density_y(strain, parameters)
 }

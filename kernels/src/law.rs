@@ -45,8 +45,10 @@ pub struct ParameterInfo {
     pub default: Option<&'static [f64]>,
     /// Whether a scene may give one value an element.
     pub per_element: bool,
-    /// Components: 1, or the array's length.
+    /// Components: 1, the array's length, or 3 of a direction.
     pub len: usize,
+    /// A fibre direction: the components of a unit vector of the body at rest.
+    pub direction: bool,
 }
 
 /// What the generator found out about a law.
@@ -54,8 +56,12 @@ pub struct ParameterInfo {
 pub struct Structure {
     /// dP does not depend on G.
     pub linear: bool,
+    /// No direction of the body at rest is preferred.
+    pub isotropic: bool,
     /// The stress needs J or the cofactors of F.
     pub uses_j: bool,
+    /// The law's response depends on fibre directions.
+    pub uses_fibres: bool,
     /// Force and force differential are polynomials in G.
     pub polynomial: bool,
 }

@@ -59,6 +59,7 @@ fn check(text: &str, out: &str, expected: &str) {
     let at = folder.path();
     fs::write(at.join("inverted.msh"), INVERTED).expect("a mesh file");
     fs::write(at.join("values.csv"), "1e6\n".repeat(24)).expect("a table");
+    fs::write(at.join("zero.csv"), format!("{}0, 0, -0.0\n", "0, 0, 1  # upright\n".repeat(23))).expect("a table");
     let out = at.join(out);
     let before = fs::read_dir(at).expect("a folder").count();
     let names = laws().iter().map(|l| l.info.name).collect::<Vec<_>>().join(", ");

@@ -147,6 +147,24 @@ impl Div<Number> for Tensor {
     }
 }
 
+/// A unit vector.
+#[derive(Clone, Copy)]
+pub struct Direction(pub [Number; 3]);
+
+/// a . T . b.
+fn between(a: Direction, t: Tensor, b: Direction) -> Number {
+    (1..9).fold(a.0[0] * t.0[0] * b.0[0], |sum, k| sum + a.0[k / 3] * t.0[k] * b.0[k % 3])
+}
+
+/// C^2, of a symmetric C.
+fn square(c: Tensor) -> Tensor {
+    let at = |i: usize, j: usize| c.0[3 * i + j];
+    Tensor(std::array::from_fn(|k| {
+        let (i, j) = (k / 3, k % 3);
+        at(i, 0) * at(0, j) + at(i, 1) * at(1, j) + at(i, 2) * at(2, j)
+    }))
+}
+
 #[derive(Clone, Copy)]
 #[allow(non_snake_case)] // the names of the law language
 pub struct Strain {
@@ -185,6 +203,25 @@ impl Strain {
     /// The sum of the principal stretches to a power that depends on parameters alone.
     pub fn stretch_sum(self, exponent: Number) -> Number {
         stretches::trace_of_power(self.C, exponent.x * Rounded::exact(0.5))
+    }
+}
+
+#[allow(non_snake_case)] // the names of the law language
+impl Strain {
+    pub fn I4(self, a: Direction) -> Number {
+        between(a, self.C, a)
+    }
+    pub fn I5(self, a: Direction) -> Number {
+        between(a, square(self.C), a)
+    }
+    pub fn I8(self, a: Direction, b: Direction) -> Number {
+        between(a, self.C, b)
+    }
+    pub fn I4bar(self, a: Direction) -> Number {
+        self.I4(a) / self.I3.powf(lit(1.0) / lit(3.0))
+    }
+    pub fn I5bar(self, a: Direction) -> Number {
+        self.I5(a) / self.I3.powf(lit(2.0) / lit(3.0))
     }
 }
 
@@ -233,6 +270,10 @@ pub fn lame_lambda(young: Number, poisson: Number) -> Number {
 }
 pub fn bulk_modulus(young: Number, poisson: Number) -> Number {
     young / (lit(3.0) * (lit(1.0) - lit(2.0) * poisson))
+}
+/// A parameter: it does not change with the state.
+pub fn parameter(x: Rounded) -> Number {
+    constant(x)
 }
 pub fn seeded(x: f64, a: f64, b: f64) -> Number {
     let [x, a, b] = [x, a, b].map(Rounded::exact);

@@ -109,8 +109,9 @@ class Law:
                 self.next("f64"), self.next(";")
                 length = int(self.next())
                 self.next("]")
-            else:
-                self.next("f64")
+            elif self.next() == "Direction":
+                bounds, length = (-1, 1), 3
+                unit = "direction"
             self.accept(",")
             self.parameters.append((name, unit, bounds, length))
             self.defaults[name] = default if length or not default else default[0]
@@ -196,7 +197,11 @@ class Law:
             if self.peek() == ".":
                 self.next()
                 name = self.next()
-                value = FUNCTIONS[name](value, *self.arguments(scope, ")")) if self.accept("(") else value[name]
+                if self.accept("("):
+                    function = FIBRES[name] if name in FIBRES else FUNCTIONS[name]
+                    value = function(value, *self.arguments(scope, ")"))
+                else:
+                    value = value[name]
             elif self.accept("["):
                 value = value[int(self.expression(scope))]
                 self.next("]")
@@ -311,6 +316,21 @@ FUNCTIONS = {
 }
 
 
+def between(a, c, b):
+    """a . c . b"""
+    return (sp.Matrix([a]) * c * sp.Matrix(b))[0]
+
+
+# The strain's methods.
+FIBRES = {
+    "I4": lambda s, a: between(a, s["C"], a),
+    "I5": lambda s, a: between(a, s["C"] ** 2, a),
+    "I8": lambda s, a, b: between(a, s["C"], b),
+    "I4bar": lambda s, a: between(a, s["C"], a) * s["J"] ** sp.Rational(-2, 3),
+    "I5bar": lambda s, a: between(a, s["C"] ** 2, a) * s["J"] ** sp.Rational(-4, 3),
+}
+
+
 def strain(g):
     f = sp.eye(3) + g
     c = f.T * f
@@ -369,13 +389,19 @@ def rotation(w, x, y, z):
     vector = sp.Matrix([x, y, z])
     cross = sp.Matrix(3, 3, [0, -z, y, z, 0, -x, -y, x, 0])
     return ((2 * w * w - n) * sp.eye(3) + 2 * vector * vector.T + 2 * w * cross) / n
+# Unit vectors with rational components.
+DIRECTIONS = [[sp.Rational(n, d) for n in v] for *v, d in [(2, -1, 2, 3), (3, 6, -2, 7), (-6, 2, 9, 11), (1, 8, 4, 9)]]
 
 
 def materials(law):
-    """Two materials, of numbers that are exact in f32, within the declared ranges."""
+    """Two materials within the declared ranges: numbers that are exact in f32, and unit vectors."""
     for which in range(2):
-        values, position = {}, 0
+        values, position, directions = {}, 0, 0
         for name, unit, (low, high), length in law.parameters:
+            if unit == "direction":
+                values[name] = DIRECTIONS[(2 * which + directions) % len(DIRECTIONS)]
+                directions += 1
+                continue
             row = []
             for _ in range(length or 1):
                 position += 1

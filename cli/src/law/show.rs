@@ -43,7 +43,9 @@ pub fn json(law: &LawInfo) -> Value {
         "constants": law.constants,
         "structure": {
             "linear": law.structure.linear,
+            "isotropic": law.structure.isotropic,
             "uses_j": law.structure.uses_j,
+            "uses_fibres": law.structure.uses_fibres,
             "polynomial": law.structure.polynomial,
         },
         "operations": law.operations.iter().map(operations_json).collect::<Value>(),
@@ -59,6 +61,7 @@ fn parameter_json(p: &ParameterInfo) -> Value {
         "default": p.default,
         "per_element": p.per_element,
         "components": p.len,
+        "direction": p.direction,
     })
 }
 
@@ -84,7 +87,9 @@ fn page(law: &LawInfo) -> String {
         ["domain", law.domain.unwrap_or("everywhere")],
         ["small strain", if law.small_strain { "yes: rotation stresses it" } else { "no" }],
         ["linear", if law.structure.linear { "yes: dP does not depend on G" } else { "no" }],
+        ["isotropic", if law.structure.isotropic { "yes" } else { "no" }],
         ["uses J", if law.structure.uses_j { "yes" } else { "no" }],
+        ["uses fibres", if law.structure.uses_fibres { "yes" } else { "no" }],
         ["polynomial", if law.structure.polynomial { "yes: P and dP are polynomials in G" } else { "no" }],
     ];
     page += "\n";
@@ -105,7 +110,8 @@ fn page(law: &LawInfo) -> String {
 }
 
 fn parameter(p: &ParameterInfo) -> Vec<String> {
-    let name = if p.len > 1 { format!("{}[{}]", p.name, p.len) } else { p.name.to_string() };
+    let range = format!("{} to {}", number(p.range.0), number(p.range.1));
+    let name = if p.len > 1 && !p.direction { format!("{}[{}]", p.name, p.len) } else { p.name.to_string() };
     let default = match p.default {
         None => "no default".to_string(),
         Some(values) => format!("default {}", values.iter().copied().map(number).collect::<Vec<_>>().join(", ")),
@@ -114,7 +120,7 @@ fn parameter(p: &ParameterInfo) -> Vec<String> {
     vec![
         name,
         p.unit.to_string(),
-        format!("{} to {}", number(p.range.0), number(p.range.1)),
+        if p.direction { "direction".to_string() } else { range },
         default,
         scope.to_string(),
         p.docs.lines().map(str::trim).collect::<Vec<_>>().join(" "),

@@ -12,7 +12,7 @@ use crate::law::ast::{self, Law, Scalar, ScalarNode, Tensor, TensorNode};
 use crate::quantity::{Kind, Quantities, Value};
 
 use super::DeriveError;
-use super::strain::{Base, Invariant, Strain};
+use super::strain::{Base, Direction, Invariant, Strain};
 
 /// A named value with more nodes than this becomes a stage of its own instead of being repeated where it is used.
 const INLINE_NODES: usize = 24;
@@ -142,6 +142,11 @@ impl<'a> Energy<'a> {
         Ok(self.strain.invariant(self.cas, self.quantities, invariant)?.into())
     }
 
+    /// The components of a direction, by its parameter.
+    fn direction(&self, parameter: usize) -> Direction {
+        std::array::from_fn(|k| self.parameters[parameter][k])
+    }
+
     fn invariant(&mut self, i: ast::Invariant) -> Result<Expr, DeriveError> {
         let c: Tensor = Rc::new(TensorNode::C);
         let two = Rational::from_integer(2);
@@ -159,7 +164,40 @@ impl<'a> Energy<'a> {
             ast::Invariant::I2bar => {
                 self.basic(Invariant::J)?.pow(Rational::new(-4, 3)) * self.invariant(ast::Invariant::I2)?
             }
+            ast::Invariant::I4(a) => {
+                let form = Invariant::Fibre(self.finite, self.direction(a));
+                self.from_identity() + self.basic(form)?
+            }
+            ast::Invariant::I5(a) => {
+                let a = self.direction(a);
+                let square = self.basic(Invariant::FibreSquare(self.finite, a))?;
+                if self.finite == Base::C {
+                    return Ok(square);
+                }
+                let linear = self.basic(Invariant::Fibre(self.finite, a))?;
+                Expr::Sum(vec![Expr::int(1), Expr::int(2) * linear, square])
+            }
+            ast::Invariant::I8(a, b) => {
+                let (a, b) = (self.direction(a), self.direction(b));
+                let pair = self.basic(Invariant::FibrePair(self.finite, a, b))?;
+                if self.finite == Base::C {
+                    return Ok(pair);
+                }
+                let cosine = Expr::Sum(a.iter().zip(&b).map(|(&x, &y)| Expr::from(x) * y.into()).collect());
+                self.quantity("cosine", Value::Expr(cosine)) + pair
+            }
+            ast::Invariant::I4bar(a) => {
+                self.basic(Invariant::J)?.pow(Rational::new(-2, 3)) * self.invariant(ast::Invariant::I4(a))?
+            }
+            ast::Invariant::I5bar(a) => {
+                self.basic(Invariant::J)?.pow(Rational::new(-4, 3)) * self.invariant(ast::Invariant::I5(a))?
+            }
         })
+    }
+
+    /// What a . A . a lacks to a . C . a.
+    fn from_identity(&self) -> Expr {
+        Expr::int(i128::from(self.finite == Base::A))
     }
 
     fn tensor(&mut self, t: &Tensor) -> Result<Combination, DeriveError> {

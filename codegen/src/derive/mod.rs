@@ -7,6 +7,7 @@
 
 mod differential;
 mod energy;
+mod fibre;
 mod rest;
 mod spectral;
 mod strain;
@@ -217,7 +218,14 @@ impl Session {
             let name = format!("W_{}", self.quantities.get(q).name);
             let mut d = Differential::new(&mut self.cas, &mut self.quantities, "W_", seeds, stop);
             let w = d.of(&self.energy)?;
-            let w = if self.quantities.is_multiple(&w) { w } else { self.quantities.stage(name, w).into() };
+            let w = if invariant.is_fibre() && !self.quantities.is_constant_expr(&w) {
+                // S = 2 W_q sym(a (x) b): with the 2 in the stage, the constants in S are those in q.
+                Expr::ratio(1, 2) * self.quantities.stage(name, self.cas.normalize(&(Expr::int(2) * w))?).into()
+            } else if self.quantities.is_multiple(&w) {
+                w
+            } else {
+                self.quantities.stage(name, w).into()
+            };
             if !w.is_zero() {
                 weights.push((invariant, q, w));
             }
@@ -230,7 +238,7 @@ impl Session {
                 let mut terms = Vec::new();
                 for (invariant, q, w) in &weights {
                     if invariant.depends_on(base) {
-                        let partial = self.partial(*q, components[k])?;
+                        let partial = self.partial(*q, components, k)?;
                         terms.push(w.clone() * partial);
                     }
                 }
@@ -269,16 +277,23 @@ impl Session {
         Ok(stress)
     }
 
-    /// The plain partial derivative of an invariant by one strain component: the given one, where there is one.
-    fn partial(&mut self, q: Symbol, component: Symbol) -> Result<Expr, DeriveError> {
-        match &self.quantities.get(q).kind {
+    /// The partial derivative of an invariant by component k of a strain, through the stages between the two: the given
+    /// one, where there is one.
+    fn partial(&mut self, q: Symbol, components: [Symbol; 6], k: usize) -> Result<Expr, DeriveError> {
+        let e = match self.quantities.get(q).kind.clone() {
             Kind::Stage { partials: Some(partials), .. } => {
-                let given = partials.iter().filter(|(by, _)| *by == component).map(|(_, e)| e.clone());
-                Ok(Expr::Sum(given.collect()))
+                let given = partials.into_iter().filter(|(by, _)| *by == components[k]).map(|(_, e)| e);
+                return Ok(Expr::Sum(given.collect()));
             }
-            Kind::Stage { value: Value::Expr(e), .. } => Ok(self.cas.derivative(e, component)?),
-            _ => Ok(Expr::int(0)),
+            Kind::Stage { value: Value::Expr(e), .. } => e,
+            _ => return Ok(Expr::int(0)),
+        };
+        let seeds = BTreeMap::from([(components[k], Expr::int(1))]);
+        let mut others: Vec<Symbol> = self.strain.gradient().to_vec();
+        for base in [Invariant::OF_C, Invariant::OF_EPS] {
+            others.extend(self.strain.components(base).into_iter().flatten());
         }
+        Ok(Differential::new(&mut self.cas, &mut self.quantities, "", seeds, others).of(&e)?)
     }
 
     fn stress_increment(&mut self, stress: &[Expr; 9], dgradient: &[Symbol]) -> Result<Vec<Expr>, DeriveError> {

@@ -60,8 +60,8 @@ impl Session {
         }
         for (invariant, s) in self.strain.invariants() {
             match invariant {
-                Invariant::Trace(_) => leaves.linear.push(s),
-                Invariant::Ddot(..) | Invariant::Det(_) => leaves.quadratic.push(s),
+                Invariant::Trace(_) | Invariant::Fibre(..) | Invariant::FibrePair(..) => leaves.linear.push(s),
+                Invariant::Ddot(..) | Invariant::Det(_) | Invariant::FibreSquare(..) => leaves.quadratic.push(s),
                 Invariant::J | Invariant::StretchSum(_) => {}
             }
         }

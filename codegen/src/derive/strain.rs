@@ -11,6 +11,7 @@ use crate::expr::{Expr, Rational, Symbol};
 use crate::ir::Input;
 use crate::quantity::{Kind, Quantities, Value};
 
+use super::fibre;
 use super::spectral::{self, Spectrum};
 
 /// The six components of a symmetric tensor, in the order in which they are stored.
@@ -29,7 +30,7 @@ pub enum Base {
 
 impl Base {
     /// The tensor's name in generated text.
-    fn label(self) -> &'static str {
+    pub fn label(self) -> &'static str {
         match self {
             Base::A => "A",
             Base::Eps => "eps",
@@ -51,7 +52,16 @@ pub enum Invariant {
     J,
     /// The sum of the principal stretches to a power, by its number among those in use.
     StretchSum(usize),
+    /// a . A . a of a direction a and a base tensor A.
+    Fibre(Base, Direction),
+    /// a . A^2 . a.
+    FibreSquare(Base, Direction),
+    /// a . A . b of two directions.
+    FibrePair(Base, Direction, Direction),
 }
+
+/// The components of a unit vector of the body at rest: parameters, hence constants of the material.
+pub type Direction = [Symbol; 3];
 
 impl Invariant {
     /// The base over which S = dW/dE is collected.
@@ -66,7 +76,13 @@ impl Invariant {
             Invariant::Ddot(a, b) => a == base || b == base,
             Invariant::StretchSum(_) => base == Base::A,
             Invariant::J => false,
+            Invariant::Fibre(b, _) | Invariant::FibreSquare(b, _) | Invariant::FibrePair(b, ..) => b == base,
         }
+    }
+
+    /// Whether the invariant is made with a direction.
+    pub fn is_fibre(self) -> bool {
+        matches!(self, Invariant::Fibre(..) | Invariant::FibreSquare(..) | Invariant::FibrePair(..))
     }
 }
 
@@ -220,6 +236,18 @@ impl Strain {
                 let spectrum =
                     self.spectrum.get_or_insert_with(|| Spectrum::of_deformation(quantities, self.deformation, c));
                 spectrum.stretch_sum(quantities, &self.exponents[k])
+            }
+            Invariant::Fibre(b, d) => {
+                let c = self.base(cas, quantities, b)?;
+                fibre::pair(quantities, b.label(), &c, d, d)
+            }
+            Invariant::FibrePair(b, d, e) => {
+                let c = self.base(cas, quantities, b)?;
+                fibre::pair(quantities, b.label(), &c, d, e)
+            }
+            Invariant::FibreSquare(b, d) => {
+                let c = self.base(cas, quantities, b)?;
+                fibre::square(quantities, b.label(), &c, d)
             }
             Invariant::Trace(b) => {
                 let c = self.base(cas, quantities, b)?;

@@ -48,8 +48,10 @@ pub struct Parameter {
     pub default: Option<Vec<f64>>,
     /// Whether a scene may give one value an element.
     pub per_element: bool,
-    /// 1 for `f64`, N for `[f64; N]`.
+    /// 1 for `f64`, N for `[f64; N]`, 3 for `Direction`.
     pub len: usize,
+    /// A `Direction`: the components of a unit vector.
+    pub direction: bool,
 }
 
 /// A unit: text as written, and its dimensions in the base (length, stress, time).
@@ -153,6 +155,29 @@ pub enum Invariant {
     I1bar,
     /// J^(-4/3) I2.
     I2bar,
+    /// a . C . a of a fibre direction a, an index in [`Law::parameters`].
+    I4(usize),
+    /// a . C^2 . a.
+    I5(usize),
+    /// a . C . b of two directions.
+    I8(usize, usize),
+    /// J^(-2/3) I4.
+    I4bar(usize),
+    /// J^(-4/3) I5.
+    I5bar(usize),
+}
+
+impl Invariant {
+    /// The directions that it takes, as indices in [`Law::parameters`].
+    pub fn directions(self) -> Vec<usize> {
+        match self {
+            Invariant::I4(a) | Invariant::I5(a) | Invariant::I4bar(a) | Invariant::I5bar(a) => vec![a],
+            Invariant::I8(a, b) => vec![a, b],
+            Invariant::I1 | Invariant::I2 | Invariant::I3 | Invariant::J | Invariant::I1bar | Invariant::I2bar => {
+                vec![]
+            }
+        }
+    }
 }
 
 /// A symmetric tensor expression.

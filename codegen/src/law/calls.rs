@@ -18,6 +18,8 @@ use super::words;
 /// Terms that one sum may have.
 const MAX_TERMS: i64 = 64;
 
+const FIELDS: &str = "a domain takes the strain's fields:";
+
 type Arguments = Punctuated<Expr, Token![,]>;
 
 impl Lowering<'_> {
@@ -42,9 +44,11 @@ impl Lowering<'_> {
         match words::function(&name) {
             Some(usage) if call.args.len() == words::arity(usage) => self.builtin(&name, span, &call.args, scope),
             Some(usage) => self.wrong_count(&name, span, usage, words::arity(usage), call.args.len()),
-            None if words::unsupported(&name) => {
-                let reason = format!("`{name}` (fibres and principal stretches) is not supported by this version");
-                self.broken(span, reason, words::suggest("", words::FUNCTIONS, "the functions are"))
+            None if words::fibre_remedy(&name).is_some() => {
+                let remedy = words::fibre_remedy(&name).unwrap_or_default();
+                // The domain is written without `s.` and `p.`: it has the strain's fields only.
+                let remedy = if self.stack.is_empty() { words::suggest("", words::STRAIN, FIELDS) } else { remedy };
+                self.broken(span, format!("`{name}` is no function by itself"), remedy)
             }
             None if let Some(remedy) = words::stretch_remedy(&name) => {
                 self.broken(span, format!("unknown function `{name}`"), remedy)
@@ -59,7 +63,7 @@ impl Lowering<'_> {
         }
     }
 
-    fn wrong_count(&mut self, name: &str, span: Span, usage: &str, expected: usize, found: usize) -> Value {
+    pub(super) fn wrong_count(&mut self, name: &str, span: Span, usage: &str, expected: usize, found: usize) -> Value {
         let plural = if expected == 1 { "" } else { "s" };
         let reason = format!("`{name}` takes {expected} argument{plural}, and here it is given {found}");
         self.broken(span, reason, format!("write `{usage}`"))
@@ -196,14 +200,19 @@ impl Lowering<'_> {
             Value::Broken => return Value::Broken,
             Value::Strain if name == "stretch_sum" => return self.stretch_sum(call, scope),
             Value::Strain => {
+                if let Some(usage) = words::fibre_invariant(&name) {
+                    return self.fibre_invariant(usage, call, scope);
+                }
                 let remedy = if let Some(remedy) = words::stretch_remedy(&name) {
                     remedy.to_owned()
                 } else if words::STRAIN.contains(&name.as_str()) {
                     format!("write `s.{name}` without the brackets")
                 } else {
-                    words::suggest(&name, words::STRAIN, "take a field of it:")
+                    let fields = words::suggest(&name, words::STRAIN, "take a field of it:");
+                    words::fibre_remedy(&name).unwrap_or(fields)
                 };
-                return self.broken(span, format!("the strain has no method `{name}`"), remedy);
+                let reason = format!("the strain has no method `{name}`");
+                return self.broken(span, reason, remedy);
             }
             Value::Parameters => {
                 let remedy = "write `p.name` without brackets, and `*` for a product";

@@ -177,6 +177,10 @@ impl<'a> Lowering<'a> {
                 let remedy = "take one of its fields, as in `p.name`";
                 self.error(expr.span(), "a scalar is needed here, and this is the parameters", remedy);
             }
+            Value::Direction(_) => {
+                let remedy = "take an invariant of the strain with it, such as `s.I4(p.a)`";
+                self.error(expr.span(), "a scalar is needed here, and this is a direction", remedy);
+            }
             Value::Array(_) => {
                 let remedy = "take a component, as in `p.mu[0]`, or `sum(0..N, |i| p.mu[i])`";
                 self.error(expr.span(), "a scalar is needed here, and this is an array", remedy);
@@ -317,8 +321,11 @@ impl<'a> Lowering<'a> {
         self.broken(span, format!("there is no parameter `{name}`"), remedy)
     }
 
-    /// Parameter number `index`, a scalar or an array.
+    /// Parameter number `index`, a scalar, an array or a direction.
     pub(super) fn parameter(&self, index: usize) -> Value {
+        if self.parameters[index].direction {
+            return Value::Direction(index);
+        }
         // `[f64; 1]` is refused: a longer length means an array.
         if self.parameters[index].len > 1 { Value::Array(index) } else { Value::Scalar(self.component(index, 0)) }
     }

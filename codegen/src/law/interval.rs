@@ -165,6 +165,14 @@ impl Values {
             Invariant::I2 | Invariant::I3 => Values { anywhere: Interval::NON_NEGATIVE, upright: Interval::POSITIVE },
             Invariant::J => Values { anywhere: Interval::ALL, upright: Interval::POSITIVE },
             Invariant::I1bar | Invariant::I2bar => isochoric,
+            // Squares of lengths of F a and C a, which vanish only with J.
+            Invariant::I4(_) | Invariant::I5(_) => {
+                Values { anywhere: Interval::NON_NEGATIVE, upright: Interval::POSITIVE }
+            }
+            Invariant::I4bar(_) | Invariant::I5bar(_) => {
+                Values { anywhere: Interval::ALL, upright: Interval::POSITIVE }
+            }
+            Invariant::I8(..) => Values::ALL,
         }
     }
 

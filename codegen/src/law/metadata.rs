@@ -9,6 +9,7 @@ use syn::{Attribute, Expr, Fields, ItemStruct, Lit, LitStr, Meta, Token, Type, U
 
 use super::ast::Parameter;
 use super::error::{LawError, Source};
+use super::fibres::{self, Given};
 use super::units;
 use super::words;
 
@@ -159,6 +160,7 @@ fn parameter(
             1
         }
     };
+    let is_direction = type_name(&field.ty).as_deref() == Some("Direction");
     let text = docs(&field.attrs);
     if text.is_empty() {
         error(
@@ -169,11 +171,12 @@ fn parameter(
     }
     let (mut unit, mut range, mut default, mut per_element) = (None, None, None, false);
     let mut unit_given = false;
+    let (mut unit_place, mut range_place) = (None, None);
     for attribute in known(source, &field.attrs, ON_FIELD, "a parameter", errors) {
         let mut error = |span: Span, reason: String, remedy: &str| errors.push(source.error(span, reason, remedy));
         let place = attribute.span();
         if attribute.path().is_ident("unit") {
-            unit_given = true;
+            (unit_given, unit_place) = (true, Some(place));
             let parsed = attribute.parse_args::<LitStr>();
             match parsed.map_err(|_| String::from("`unit` takes a text")).and_then(|text| units::parse(&text.value())) {
                 Ok(parsed) => unit = Some(parsed),
@@ -184,6 +187,7 @@ fn parameter(
         } else if attribute.path().is_ident("range") {
             let remedy = "write `#[range(0.0, 1e9)]`: the least and the greatest value allowed";
             range = Some((f64::NEG_INFINITY, f64::INFINITY));
+            range_place = Some(place);
             match numbers(attribute) {
                 Ok(values) => match values[..] {
                     [low, high] if low < high => range = Some((low, high)),
@@ -204,18 +208,18 @@ fn parameter(
         }
     }
     let mut error = |span: Span, reason: String, remedy: &str| errors.push(source.error(span, reason, remedy));
-    if !unit_given {
+    if !unit_given && !is_direction {
         error(
             span,
             format!("the parameter `{name}` has no unit"),
             "write `#[unit(\"Pa\")]`, or `#[unit(\"1\")]` for none",
         );
     }
-    if range.is_none() {
+    if range.is_none() && !is_direction {
         error(span, format!("the parameter `{name}` has no range"), "write `#[range(0.0, 1e9)]`");
     }
     let range = range.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
-    if let Some((values, place)) = &default {
+    if let Some((values, place)) = default.as_ref().filter(|_| !is_direction) {
         if values.len() != len {
             let reason = format!("the number of values that `default` gives is {}, not {len}", values.len());
             error(*place, reason, "give one value a component: `#[default(1.0, 2.0)]`");
@@ -226,8 +230,18 @@ fn parameter(
     }
     let has_unit = unit.is_some();
     let unit = unit.unwrap_or(super::ast::Unit { text: String::from("1"), length: 0, stress: 0, time: 0 });
-    let default = default.map(|(values, _)| values);
-    (Parameter { name, docs: text, unit, range, default, per_element, len }, has_unit)
+    let given = Given {
+        unit: unit_place.map(|place| (unit.text.as_str(), place)),
+        range: range_place,
+        default: default.as_ref().map(|(values, place)| (values.as_slice(), *place)),
+    };
+    let default = given.default.map(|(values, _)| values.to_vec());
+    let mut parameter =
+        Parameter { name, docs: text, unit: unit.clone(), range, default, per_element, len, direction: false };
+    if is_direction {
+        fibres::direction(source, &mut parameter, &given, errors);
+    }
+    (parameter, has_unit || is_direction)
 }
 
 /// The number of components of a parameter's type.
@@ -252,11 +266,8 @@ fn length(ty: &Type) -> Result<usize, (String, &'static str)> {
     }
     match type_name(ty).as_deref() {
         Some("f64") => Ok(1),
-        Some("Direction") => {
-            let reason = String::from("`Direction`: fibre directions are not supported by this version");
-            Err((reason, "write an isotropic law"))
-        }
-        _ => Err((String::from("unknown type of a parameter"), "the types are `f64` and `[f64; 3]`")),
+        Some("Direction") => Ok(3),
+        _ => Err((String::from("unknown type of a parameter"), "the types are `f64`, `[f64; 3]` and `Direction`")),
     }
 }
 

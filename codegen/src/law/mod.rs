@@ -8,6 +8,7 @@ mod defined;
 mod dimension;
 mod error;
 mod expr;
+mod fibres;
 mod functions;
 mod interval;
 mod limits;

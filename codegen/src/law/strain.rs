@@ -16,13 +16,12 @@ impl Lowering<'_> {
             self.measured(name, span);
             return value;
         }
+        if let Some(remedy) = words::fibre_remedy(name) {
+            return self.broken(span, format!("the strain has no field `{name}`"), remedy);
+        }
         let intro = "the strain offers";
         if let Some(remedy) = words::stretch_remedy(name) {
             return self.broken(span, format!("the strain has no field `{name}`"), remedy);
-        }
-        if words::unsupported(name) {
-            let reason = format!("`{name}` (fibres and principal stretches) is not supported by this version");
-            return self.broken(span, reason, words::suggest("", words::STRAIN, intro));
         }
         if matches!(name, "F" | "G") {
             let reason = format!("the strain does not offer `{name}`: an energy of it could change under rotation");

@@ -52,7 +52,12 @@ impl Uses {
             return;
         }
         match &**scalar {
-            ScalarNode::Number(_) | ScalarNode::Invariant(_) => {}
+            ScalarNode::Number(_) => {}
+            ScalarNode::Invariant(invariant) => {
+                for direction in invariant.directions() {
+                    self.found.extend((0..3).map(|component| (direction, component)));
+                }
+            }
             ScalarNode::Parameter { parameter, component } => {
                 self.found.insert((*parameter, *component));
             }

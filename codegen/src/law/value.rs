@@ -97,6 +97,8 @@ pub(super) enum Value {
     Parameters,
     /// An array parameter, by its index.
     Array(usize),
+    /// A direction, by its parameter's index.
+    Direction(usize),
     Integer(Integer),
     /// Already reported as an error: what uses it is not reported again.
     Broken,
@@ -111,6 +113,7 @@ impl Value {
             Value::Strain => "the strain",
             Value::Parameters => "the parameters",
             Value::Array(_) => "an array",
+            Value::Direction(_) => "a direction",
             Value::Integer(_) => "an integer",
             Value::Broken => "an error",
         }

@@ -5,6 +5,8 @@ pub(super) const STRAIN: &[&str] = &["eps", "E", "C", "I1", "I2", "I3", "J", "I1
 
 /// Methods of the `Strain` argument, as they are called.
 pub(super) const STRAIN_METHODS: &[&str] = &["stretch_sum(a)"];
+/// The strain's methods, as they are called: invariants with fibre directions.
+pub(super) const FIBRE: &[&str] = &["I4(p.a)", "I5(p.a)", "I8(p.a, p.b)", "I4bar(p.a)", "I5bar(p.a)"];
 
 /// Methods of a scalar, as they are called.
 pub(super) const METHODS: &[&str] = &["powi(n)", "powf(a)", "ln()", "exp()", "sqrt()"];
@@ -43,13 +45,27 @@ pub(super) fn function(name: &str) -> Option<&'static str> {
     FUNCTIONS.iter().copied().find(|usage| bare(usage) == name)
 }
 
-/// Names that other laws need and that this version does not have: fibres.
-pub(super) fn unsupported(name: &str) -> bool {
+/// The method of the strain of that name, as it is called.
+pub(super) fn fibre_invariant(name: &str) -> Option<&'static str> {
+    FIBRE.iter().copied().find(|usage| bare(usage) == name)
+}
+
+/// What to write for a name that means fibres; `None` if it does not.
+pub(super) fn fibre_remedy(name: &str) -> Option<String> {
     let lower = name.to_ascii_lowercase();
-    let fibre_invariant = lower.strip_prefix('i').and_then(|rest| rest.chars().next()).is_some_and(|c| {
-        ('4'..='8').contains(&c) && lower.chars().skip(2).all(|c| c.is_ascii_digit() || c == '_' || "bar".contains(c))
+    let numbered = lower.strip_prefix('i').and_then(|rest| rest.chars().next()).filter(|c| {
+        ('4'..='8').contains(c) && lower.chars().skip(2).all(|c| c.is_ascii_digit() || c == '_' || "bar".contains(c))
     });
-    fibre_invariant || ["fibre", "fiber", "direction"].iter().any(|word| lower.contains(word))
+    let fibres = ["fibre", "fiber", "direction"].iter().any(|word| lower.contains(word));
+    let all = || format!("declare a parameter `a: Direction` and call a method of the strain: {}", FIBRE.join(", "));
+    match (fibre_invariant(name), numbered) {
+        (Some(usage), _) => Some(format!("write `s.{usage}`, with a parameter `a: Direction`")),
+        // The second family's numbers, in the usual counting.
+        (None, Some('6')) => Some(String::from("write `s.I4(p.b)`, with the second family's direction `b: Direction`")),
+        (None, Some('7')) => Some(String::from("write `s.I5(p.b)`, with the second family's direction `b: Direction`")),
+        (None, Some(_)) => Some(all()),
+        (None, None) => fibres.then(all),
+    }
 }
 
 /// The remedy for a name of principal stretches that the language does not have: the one form that it has.

@@ -120,8 +120,8 @@ fn info(law: &Law, derivation: &Derivation, reviewed: bool) -> TokenStream {
         None => quote!(None),
     };
     let constants = &derivation.constants;
-    let structure = crate::structure::detect(derivation);
-    let (linear, uses_j, polynomial) = (structure.linear, structure.uses_j, structure.polynomial);
+    let structure = crate::structure::detect(law, derivation);
+    let crate::structure::Structure { linear, isotropic, uses_j, uses_fibres, polynomial } = structure;
     let operations = derivation.kernels[1..].iter().map(|k| {
         let (name, c) = (&k.ir().name, k.count());
         let counts = [c.additions, c.multiplications, c.divisions, c.functions, c.selects];
@@ -137,7 +137,10 @@ fn info(law: &Law, derivation: &Derivation, reviewed: bool) -> TokenStream {
             domain: #domain,
             small_strain: #small_strain,
             constants: &[#(#constants),*],
-            structure: Structure { linear: #linear, uses_j: #uses_j, polynomial: #polynomial },
+            structure: Structure {
+                linear: #linear, isotropic: #isotropic, uses_j: #uses_j, uses_fibres: #uses_fibres,
+                polynomial: #polynomial,
+            },
             operations: &[#(#operations),*],
             hash: #hash,
             reviewed: #reviewed,
@@ -146,20 +149,21 @@ fn info(law: &Law, derivation: &Derivation, reviewed: bool) -> TokenStream {
 }
 
 fn parameter(p: &Parameter) -> TokenStream {
-    let (name, docs, unit, len, per_element) = (&p.name, p.docs.trim(), &p.unit.text, plain(p.len), p.per_element);
+    let (name, docs, unit, len) = (&p.name, p.docs.trim(), &p.unit.text, plain(p.len));
+    let (per_element, direction) = (p.per_element, p.direction);
     let dimensions = [p.unit.length, p.unit.stress, p.unit.time].map(Literal::i32_unsuffixed);
-    let [low, high] = [p.range.0, p.range.1].map(|x| {
-        let magnitude = Literal::f64_unsuffixed(x.abs());
-        if x < 0.0 { quote!(-#magnitude) } else { quote!(#magnitude) }
-    });
+    let [low, high] = [p.range.0, p.range.1].map(signed);
     let default = match &p.default {
-        Some(values) => quote!(Some(&[#(#values),*])),
+        Some(values) => {
+            let values = values.iter().copied().map(signed);
+            quote!(Some(&[#(#values),*]))
+        }
         None => quote!(None),
     };
     quote! {
         ParameterInfo {
             name: #name, docs: #docs, unit: #unit, dimensions: [#(#dimensions),*], range: (#low, #high),
-            default: #default, per_element: #per_element, len: #len,
+            default: #default, per_element: #per_element, len: #len, direction: #direction,
         }
     }
 }
@@ -371,7 +375,11 @@ fn binary(a: &TokenStream, op: TokenStream, b: &TokenStream) -> TokenStream {
 }
 
 fn float(q: Rational) -> TokenStream {
-    let value = <f64 as crate::ir::Number>::from_rational(q);
+    signed(<f64 as crate::ir::Number>::from_rational(q))
+}
+
+/// A number as the language writes it: a literal has no sign.
+fn signed(value: f64) -> TokenStream {
     let magnitude = Literal::f64_unsuffixed(value.abs());
     if value < 0.0 { quote!(-#magnitude) } else { quote!(#magnitude) }
 }

@@ -1,4 +1,4 @@
-//! A law's parameters as a scene gives them: names, lengths, ranges, defaults, values for each element.
+//! A law's parameters as a scene gives them: names, lengths, ranges, directions, defaults, values for each element.
 
 use tensormass_kernels::{LawEntry, ParameterInfo};
 
@@ -59,7 +59,7 @@ fn column(
     elements: usize,
 ) -> Result<Vec<Vec<f64>>, SceneError> {
     let path = format!("{base}.parameters.{}", info.name);
-    let values = match material.parameters.get(info.name) {
+    let mut values = match material.parameters.get(info.name) {
         None => match info.default {
             Some(default) => return Ok(vec![default.to_vec()]),
             None => {
@@ -91,7 +91,7 @@ fn column(
             "give one value for each element of the mesh, in the mesh's order",
         ));
     }
-    for (e, value) in values.iter().enumerate() {
+    for (e, value) in values.iter_mut().enumerate() {
         let which = if many { format!(" of element {e}") } else { String::new() };
         if value.len() != info.len {
             return Err(SceneError::at(
@@ -110,6 +110,18 @@ fn column(
                 },
             ));
         }
+        if info.direction {
+            *value = unit_vector(value).ok_or_else(|| {
+                // A file's rows have no place in the scene: the element is named.
+                let place = if many { format!("{path}.per_element.{e}") } else { path.clone() };
+                SceneError::at(
+                    scene.locate(&place),
+                    format!("`{}`{which} is {value:?}, which has no direction", info.name),
+                    "give a vector that is not zero, such as [1, 0, 0]; its length does not matter",
+                )
+            })?;
+            continue;
+        }
         let (low, high) = info.range;
         if let Some(x) = value.iter().find(|x| !(low..=high).contains(*x)) {
             return Err(SceneError::at(
@@ -121,6 +133,18 @@ fn column(
     }
     // One element's mesh and one value for it are the same thing; two rows tell a reader of `columns` that they vary.
     Ok(values)
+}
+
+/// The unit vector along a vector; `None` where that is zero or not finite.
+fn unit_vector(vector: &[f64]) -> Option<Vec<f64>> {
+    let largest = vector.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    if largest == 0.0 || !vector.iter().all(|x| x.is_finite()) {
+        return None;
+    }
+    // Squares of the components themselves may leave the range of numbers.
+    let scaled: Vec<f64> = vector.iter().map(|x| x / largest).collect();
+    let length = scaled.iter().map(|x| x * x).sum::<f64>().sqrt();
+    Some(scaled.iter().map(|x| x / length).collect())
 }
 
 /// The unit in brackets, if there is one.

@@ -106,7 +106,7 @@ pub fn parameters(law: &LawEntry) -> Vec<f64> {
     let one = |p: &tensormass_runtime::ParameterInfo| {
         let wish = match p.dimensions {
             [0, 1, 0] => 1e6,
-            _ if p.len == 3 => 1.0 / 3.0_f64.sqrt(),
+            _ if p.direction => 1.0 / 3.0_f64.sqrt(),
             _ => 0.3,
         };
         let (low, high) = p.range;

@@ -1,7 +1,7 @@
 //! A law at a material point: its compiled kernels on a one-element batch, with the rounding bound of its derivation.
 
 use tensormass_codegen::derivation::Derivation;
-use tensormass_codegen::ir::Input;
+use tensormass_codegen::ir::{Input, Op, Output, ValidKernel};
 use tensormass_kernels::batch::{Batch, RestElement};
 use tensormass_kernels::{BatchKernels, LawEntry, Real};
 
@@ -91,11 +91,27 @@ pub struct Point {
     pub derivation: Derivation,
     /// The material's parameters.
     pub parameters: Vec<f64>,
+    /// The same, with what they were rounded by: the components of a direction are those of a unit vector, rounded.
+    pub rounded: Vec<Rounded>,
     /// Kernels in double precision.
     pub double: Compiled<f64>,
     /// Kernels in single precision.
     pub single: Compiled<f32>,
     constants: Vec<Rounded>,
+    comparisons: ValidKernel,
+}
+
+/// The force kernel with the left and the right sides of its selections' comparisons as its last two results.
+fn comparisons(derivation: &Derivation) -> ValidKernel {
+    let mut kernel = derivation.kernel("force").ir().clone();
+    let sides = kernel.values.iter().filter_map(|d| match d.op {
+        Op::Select(left, right, _, _) => Some((left, right)),
+        _ => None,
+    });
+    let (left, right) = sides.unzip();
+    // Roles of any length.
+    kernel.outputs.extend([(Output::NodalForce, left), (Output::NodeGradients, right)]);
+    kernel.validate().expect("the values of a valid kernel")
 }
 
 impl Point {
@@ -104,26 +120,41 @@ impl Point {
     /// # Panics
     /// The law has no derivation.
     pub fn new(generated: &str, entry: &'static LawEntry, parameters: Vec<f64>) -> Self {
-        let derivation = crate::derivation(generated, entry.info.name);
+        let flags = entry.info.parameters.iter().flat_map(|p| vec![p.direction; p.len]);
+        let exact = |x: f64| x.abs() == 1.0 || x == 0.0;
+        let round = |(p, direction): (f64, bool)| {
+            if direction && !exact(p) { Rounded::nearest(p) } else { Rounded::exact(p) }
+        };
+        let rounded = parameters.into_iter().zip(flags).map(round).collect();
+        Self::of(crate::derivation(generated, entry.info.name), entry, rounded)
+    }
+
+    /// A material of a law, of parameters that carry what they were rounded by.
+    ///
+    /// # Panics
+    /// The parameters are not the law's.
+    pub fn of(derivation: Derivation, entry: &'static LawEntry, rounded: Vec<Rounded>) -> Self {
+        let parameters: Vec<f64> = rounded.iter().map(|p| p.value).collect();
         let values = entry.constants(&parameters);
-        let exact: Vec<Rounded> = parameters.iter().map(|&p| Rounded::exact(p)).collect();
-        let material = derivation.kernel("material").interpret(&[(Input::Parameters, exact.as_slice())]);
+        let material = derivation.kernel("material").interpret(&[(Input::Parameters, rounded.as_slice())]);
         // In f32 the constants are rounded once more.
         let bounds = material.expect("one value a parameter component").remove(0).into_iter();
         let constants = bounds.zip(&values).map(|(b, &v)| Rounded::new(v, b.error + v.abs())).collect::<Vec<_>>();
         let double = Compiled::new((entry.f64)(), &values);
         let single = Compiled::new((entry.f32)(), &values);
-        Self { entry, derivation, parameters, double, single, constants }
+        let comparisons = comparisons(&derivation);
+        Self { entry, derivation, parameters, rounded, double, single, constants, comparisons }
     }
 
-    /// G at a random state (see [`Rng::gradient`]) well inside the law's domain: where states of this stretch may be
-    /// outside, half as far from rest as those that are not.
+    /// G at a random state (see [`Rng::gradient`]) well inside the law's domain, with an energy that f32 holds: where
+    /// states of this stretch may be outside, half as far from rest as those that are not.
     ///
     /// # Panics
     /// The law reports every state as outside.
     pub fn state(&self, rng: &mut Rng, (low, high): (f64, f64)) -> [f64; 9] {
         let mut draw = |s: f64| rng.gradient(low.powf(s), high.powf(s));
-        let mut inside = |s: &f64| (0..16).all(|_| !self.double.force(&draw(*s)).1);
+        let held = |g: &[f64; 9]| !self.double.force(g).1 && self.single.energy(&g.map(|x| x as f32)).0.is_finite();
+        let mut inside = |s: &f64| (0..16).all(|_| held(&draw(*s)));
         let share = (0..32).map(|k| 0.8f64.powi(k)).find(&mut inside);
         let share = share.unwrap_or_else(|| panic!("{}: no state is inside the domain", self.entry.info.name));
         draw(if share < 1.0 { share / 2.0 } else { share })
@@ -171,6 +202,16 @@ impl Point {
     pub fn cauchy(&self, g: &Matrix) -> Matrix {
         let bounds = self.bounds("cauchy", &[(Input::DisplacementGradient, g)]);
         self.bounded(self.double.cauchy(&tensor::values(g)), &bounds[0])
+    }
+
+    /// Which branch each selection of the force kernel takes.
+    pub fn branches(&self, g: &Matrix) -> Vec<bool> {
+        let constants: Vec<f64> = self.constants.iter().map(|c| c.value).collect();
+        let g = tensor::values(g);
+        let inputs = [(Input::Constants, constants.as_slice()), (Input::DisplacementGradient, g.as_slice())];
+        let mut results = self.comparisons.interpret(&inputs).expect("the inputs of a point kernel");
+        let (right, left) = (results.pop().unwrap_or_default(), results.pop().unwrap_or_default());
+        left.iter().zip(&right).map(|(left, right)| left > right).collect()
     }
 
     /// Left minus right side of the domain's inequality, where the law has one.

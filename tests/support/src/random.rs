@@ -56,11 +56,27 @@ impl Rng {
         tensor::values(&g).map(|x| f64::from(x as f32))
     }
 
+    /// A unit vector with rational components, each rounded once to f64: the rotated x axis of a quaternion of integers.
+    pub fn unit_vector(&mut self) -> [f64; 3] {
+        loop {
+            let [w, x, y, z] = std::array::from_fn(|_| self.uniform(-16.0, 16.0).round());
+            let square = w * w + x * x + y * y + z * z;
+            if square > 0.0 {
+                return [w * w + x * x - y * y - z * z, 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)]
+                    .map(|n| n / square);
+            }
+        }
+    }
+
     /// Parameters within the declared ranges, of ordinary size where the range allows: stresses between 1e5 and 1e7 Pa,
-    /// pure numbers between -0.4 and 0.45; mirrored where only negative ones are allowed.
+    /// pure numbers between -0.4 and 0.45, mirrored where only negative ones are allowed; directions are unit vectors.
     pub fn parameters(&mut self, info: &LawInfo) -> Vec<f64> {
         let mut all = vec![];
         for p in info.parameters {
+            if p.direction {
+                all.extend(self.unit_vector());
+                continue;
+            }
             let usual: (f64, f64) = match p.unit {
                 "Pa" => (1e5, 1e7),
                 "1" => (-0.4, 0.45),
