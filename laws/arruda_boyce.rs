@@ -1,5 +1,5 @@
-//! Arruda-Boyce solid: rubber as a network of eight chains a cell, each of N rigid links; five terms of the series of
-//! the inverse Langevin function.
+//! Arruda-Boyce solid: rubber as a network of chains of N rigid links, eight chains a cell.
+//! Five terms of the series of the inverse Langevin function.
 //! Arruda & Boyce, A Three-Dimensional Constitutive Model for the Large Stretch Behavior of Rubber Elastic Materials,
 //! Journal of the Mechanics and Physics of Solids 41, 1993, doi:10.1016/0022-5096(93)90013-6, for incompressible
 //! rubber; here with I1bar for I1, and a quadratic penalty as the volumetric part.

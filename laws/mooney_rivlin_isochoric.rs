@@ -1,4 +1,4 @@
-//! Mooney-Rivlin solid with isochoric and volumetric parts apart,
+//! Mooney-Rivlin solid with isochoric and volumetric parts apart.
 //! W = c10 (I1bar - 3) + c01 (I2bar - 3) + kappa/2 (J - 1)^2.
 //! Mooney, Journal of Applied Physics 11, 1940, doi:10.1063/1.1712836, in the invariants of Rivlin, Philosophical
 //! Transactions of the Royal Society A 241, 1948, doi:10.1098/rsta.1948.0024; the split is that of Holzapfel, Nonlinear

@@ -1,4 +1,4 @@
-//! Yeoh solid: three powers of the first isochoric invariant,
+//! Yeoh solid: three powers of the first isochoric invariant, and a volumetric part.
 //! W = c10 (I1bar - 3) + c20 (I1bar - 3)^2 + c30 (I1bar - 3)^3 + kappa/2 (J - 1)^2.
 //! Yeoh, Some Forms of the Strain Energy Function for Rubber, Rubber Chemistry and Technology 66, 1993,
 //! doi:10.5254/1.3538343, for incompressible rubber; the volumetric part is a quadratic penalty.

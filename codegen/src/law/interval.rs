@@ -156,8 +156,8 @@ impl Values {
         Values { anywhere: interval, upright: interval }
     }
 
-    /// The values of an invariant. C has no negative eigenvalue, and each of its invariants vanishes only with J, but
-    /// for I1: it is 0 only where an element is a point. Where J > 0, the isochoric ones have their least value at rest.
+    /// The values of an invariant. No eigenvalue of C is negative, so that I2 and I3 can be 0 where J is. I1 is 0 only
+    /// where an element has become a point, which is not counted. Where J > 0, I1bar and I2bar are least at rest.
     pub(super) fn of_invariant(invariant: Invariant) -> Values {
         let isochoric = Values { anywhere: Interval::ALL, upright: Interval::new(3.0, f64::INFINITY) };
         match invariant {

@@ -1,4 +1,4 @@
-//! Gent solid: rubber whose chains cannot be stretched beyond a limit,
+//! Gent solid: rubber whose chains cannot be stretched beyond a limit.
 //! W = -mu j_m/2 ln(1 - (I1bar - 3) / j_m) + kappa/2 (J - 1)^2.
 //! Gent, A New Constitutive Relation for Rubber, Rubber Chemistry and Technology 69, 1996, doi:10.5254/1.3538357, for
 //! incompressible rubber; here with I1bar for I1, and a quadratic penalty as the volumetric part.
