@@ -73,6 +73,17 @@ impl Quantities {
         self.add(name, Kind::Stage { value: Value::Expr(e), partials: None })
     }
 
+    /// The stages that are selections, with names and values.
+    pub fn selections(&self) -> Vec<(Symbol, String, Value)> {
+        let each = self.0.iter().enumerate().filter_map(|(i, q)| match &q.kind {
+            Kind::Stage { value: value @ Value::Select { .. }, .. } => {
+                Some((Symbol(i as u32), q.name.clone(), value.clone()))
+            }
+            _ => None,
+        });
+        each.collect()
+    }
+
     /// The quantity of a symbol.
     pub fn get(&self, s: Symbol) -> &Quantity {
         &self.0[s.0 as usize]

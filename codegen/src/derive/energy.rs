@@ -32,6 +32,8 @@ pub struct Energy<'a> {
     /// The symbols of the parameters' components, parameter by parameter.
     parameters: Vec<Vec<Symbol>>,
     known: HashMap<*const ScalarNode, Expr>,
+    /// The comparisons of the law's selections.
+    pub conditions: Vec<(Expr, Expr)>,
     /// The tensor in which finite strains are expressed.
     finite: Base,
 }
@@ -50,7 +52,7 @@ impl<'a> Energy<'a> {
             }
             parameters.push(components);
         }
-        Self { cas, quantities, strain, parameters, known: HashMap::new(), finite: Base::A }
+        Self { cas, quantities, strain, parameters, known: HashMap::new(), conditions: vec![], finite: Base::A }
     }
 
     /// The declared ranges, by the parameters' symbols.
@@ -114,7 +116,9 @@ impl<'a> Energy<'a> {
             ScalarNode::Sqrt(a) => self.scalar(a)?.pow(Rational::new(1, 2)),
             ScalarNode::Select { left, right, then, otherwise } => {
                 let [left, right, then, otherwise] = [left, right, then, otherwise].map(|x| self.scalar(x));
-                let value = Value::Select { left: left?, right: right?, then: then?, otherwise: otherwise? };
+                let (left, right) = (left?, right?);
+                self.conditions.push((left.clone(), right.clone()));
+                let value = Value::Select { left, right, then: then?, otherwise: otherwise? };
                 self.quantity("select", value)
             }
             ScalarNode::Named(name, value) => {

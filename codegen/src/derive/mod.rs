@@ -62,6 +62,8 @@ struct Session {
     rest: Rest,
     /// The energy in C instead of C - I.
     far_energy: Expr,
+    /// The comparisons of the law's selections.
+    conditions: Vec<(Expr, Expr)>,
 }
 
 impl Session {
@@ -79,6 +81,7 @@ impl Session {
             None => None,
         };
         let ranges = reader.ranges(law);
+        let conditions = std::mem::take(&mut reader.conditions);
         reader.far_from_rest();
         let far_energy = reader.scalar(&law.energy)?;
         let far_energy = cas.normalize(&far_energy)?;
@@ -93,6 +96,7 @@ impl Session {
             margin,
             rest: Rest::new(ranges),
             far_energy,
+            conditions,
         })
     }
 
@@ -140,10 +144,10 @@ impl Session {
             }
             None => point.push(self.lower("force", &[G], with_margin(Output::Stress, stress.to_vec(), &margin))),
         }
-        let accurate = self.accurate_jacobian()?;
+        let accurate = self.accurate()?;
         let outputs = vec![(Output::StressIncrement, increment)];
-        point.push(self.lower_with("dforce", &[G, GradientIncrement], outputs, accurate));
-        point.push(self.lower_with("diagonal", &[G, NodeGradient], vec![(Output::Diagonal, diagonal)], accurate));
+        point.push(self.lower_with("dforce", &[G, GradientIncrement], outputs, &accurate));
+        point.push(self.lower_with("diagonal", &[G, NodeGradient], vec![(Output::Diagonal, diagonal)], &accurate));
         match near_stress {
             Some(near) => {
                 let outputs = vec![(Output::Cauchy, near.cauchy), (Output::NearRest, vec![near.holds])];
@@ -171,22 +175,22 @@ impl Session {
     }
 
     fn lower(&mut self, name: &str, inputs: &[Input], outputs: Vec<(Output, Vec<Expr>)>) -> KernelIr {
-        self.lower_with(name, inputs, outputs, None)
+        self.lower_with(name, inputs, outputs, &[])
     }
 
-    /// As `lower`, computing the second quantity of `instead` for the first.
+    /// As `lower`, computing the second quantity of each pair of `instead` for the first.
     fn lower_with(
         &mut self,
         name: &str,
         inputs: &[Input],
         outputs: Vec<(Output, Vec<Expr>)>,
-        instead: Option<(Symbol, Symbol)>,
+        instead: &[(Symbol, Symbol)],
     ) -> KernelIr {
         let cas = &mut self.cas;
         // A normalisation that the system cannot express leaves the expression as it stands: still right.
         let normalize = |e: &Expr| cas.normalize(e).unwrap_or_else(|_| e.clone());
         let mut lowering = Lowering::new(&self.quantities, Some(&mut self.constants), normalize);
-        if let Some((s, other)) = instead {
+        for &(s, other) in instead {
             lowering.compute_instead(s, other);
         }
         let outputs =

@@ -7,8 +7,10 @@ use crate::split::{Leaves, Split, SplitError, Splitter};
 use super::strain::{Base, Invariant};
 use super::{DeriveError, Session};
 
-/// Splitting serves up to E:E = 4, that is A:A = 16 ..
-const GREATEST_STRAIN: i128 = 16;
+/// Splitting serves up to E:E = 4, that is A:A = 16.
+const GREATEST_STRAIN: (i128, i128) = (16, 1);
+/// With principal stretches, whose squares are 1 + a_p with errors of the greatest a_p: up to A:A = 1/4.
+const GREATEST_STRETCH: (i128, i128) = (1, 4);
 
 /// The energy near rest.
 pub struct NearEnergy {
@@ -51,8 +53,7 @@ impl Session {
         }
         let sums = self.strain.near_stretch_sums(&mut self.quantities);
         if !sums.is_empty() {
-            let trace =
-                self.strain.invariant(&mut self.cas, &mut self.quantities, Invariant::Trace(Base::A))?;
+            let trace = self.strain.invariant(&mut self.cas, &mut self.quantities, Invariant::Trace(Base::A))?;
             for s in sums {
                 let change = Split::given(Expr::int(3), s.change);
                 leaves.others.push((s.sum, change.to_second_order(trace, s.half, s.remainder)));
@@ -111,25 +112,46 @@ impl Session {
         }
         let stress: [Expr; 9] = near.try_into().expect("nine components");
         let cauchy = self.cauchy_of(&stress, &j, &f);
-        let holds = self.near_rest(uses_j.then_some(j), !uses_j)?;
+        let bounded = !uses_j || self.strain.has_stretch_sums();
+        let holds = self.near_rest(uses_j.then_some(j), bounded)?;
         Ok(Some(NearStress { stress, margin, cauchy, holds }))
     }
 
-    /// J, if the law uses it, and a quantity that is J with fewer roundings near rest, 1 + j where j > -1/2: tangents
-    /// divide by J more than once, and nothing in them cancels.
-    pub(super) fn accurate_jacobian(&mut self) -> Result<Option<(Symbol, Symbol)>, DeriveError> {
-        let Some(&(_, jacobian)) = self.strain.invariants().iter().find(|(i, _)| *i == Invariant::J) else {
-            return Ok(None);
-        };
-        let mut splitter = Splitter::first(&mut self.cas, &mut self.quantities, &mut self.rest, "force");
-        let split = splitter.split(&jacobian.into())?;
-        let accurate = Value::Select {
-            left: split.change,
-            right: Expr::ratio(-1, 2),
-            then: split.value,
-            otherwise: jacobian.into(),
-        };
-        Ok(Some((jacobian, self.quantities.add("J", Kind::Stage { value: accurate, partials: None }))))
+    /// What tangents compute otherwise than the textbook, although nothing in them cancels, as pairs of a quantity and
+    /// its stand-in: J with fewer roundings near rest (1 + j where j > -1/2), because they divide by it more than once;
+    /// and selections by comparisons that are decided rightly near rest.
+    pub(super) fn accurate(&mut self) -> Result<Vec<(Symbol, Symbol)>, DeriveError> {
+        let jacobian = self.strain.invariants().iter().find(|(i, _)| *i == Invariant::J).map(|&(_, j)| j);
+        let sums = self.strain.near_stretch_sums(&mut self.quantities);
+        let selections = self.quantities.selections();
+        let conditions = self.conditions.clone();
+        let mut splitter = Splitter::first(&mut self.cas, &mut self.quantities, &mut self.rest, "dforce");
+        for s in sums {
+            splitter.give(s.sum, Split::given(Expr::int(3), s.change));
+        }
+        let mut stand_ins = Vec::new();
+        if let Some(jacobian) = jacobian {
+            let split = splitter.split(&jacobian.into())?;
+            let (left, right) = (split.change, Expr::ratio(-1, 2));
+            stand_ins.push((jacobian, "J".to_string(), left, right, split.value, jacobian.into()));
+        }
+        for (left, right) in conditions {
+            let Some(decided) = splitter.condition(&left, &right)? else { continue };
+            for (s, name, value) in &selections {
+                if let Value::Select { left: l, right: r, then, otherwise } = value
+                    && (l, r) == (&left, &right)
+                {
+                    let (left, right) = decided.clone();
+                    stand_ins.push((*s, name.clone(), left, right, then.clone(), otherwise.clone()));
+                }
+            }
+        }
+        let mut pairs = Vec::new();
+        for (s, name, left, right, then, otherwise) in stand_ins {
+            let value = Value::Select { left, right, then, otherwise };
+            pairs.push((s, self.quantities.add(name, Kind::Stage { value, partials: None })));
+        }
+        Ok(pairs)
     }
 
     /// Positive where j >= -1/2 and, if the strain is bounded too, E:E <= 4.
@@ -139,7 +161,8 @@ impl Session {
             return Ok(above_half);
         }
         let square = self.strain.invariant(&mut self.cas, &mut self.quantities, Invariant::Ddot(Base::A, Base::A))?;
-        let small = Expr::int(GREATEST_STRAIN) - Expr::from(square);
+        let (n, d) = if self.strain.has_stretch_sums() { GREATEST_STRETCH } else { GREATEST_STRAIN };
+        let small = Expr::ratio(n, d) - Expr::from(square);
         let Some(above_half) = above_half else { return Ok(small) };
         let least =
             Value::Select { left: small.clone(), right: above_half.clone(), then: above_half, otherwise: small };

@@ -292,6 +292,11 @@ impl Strain {
         self.invariant(cas, quantities, Invariant::StretchSum(k))
     }
 
+    /// Whether a sum of powers of the principal stretches is in use.
+    pub fn has_stretch_sums(&self) -> bool {
+        self.spectrum.is_some()
+    }
+
     /// The sums of powers of the principal stretches in use, in forms that are split at rest.
     pub fn near_stretch_sums(&mut self, quantities: &mut Quantities) -> Vec<NearStretchSum> {
         let (Some(spectrum), Some(strain)) = (&self.spectrum, self.bases.get(&Base::A)) else { return vec![] };

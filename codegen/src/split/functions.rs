@@ -13,7 +13,10 @@ impl Splitter<'_> {
             let ln = Expr::Ln(Box::new(Expr::int(1) + p.into()));
             return self.split(&(Expr::ratio(1, 2) * ln));
         }
-        let a = self.split(argument)?;
+        let a = self.part(argument)?;
+        if let Some(jump) = a.jump {
+            return Ok(self.jumping(Expr::Ln(Box::new(a.value)), jump));
+        }
         self.require_positive(e, &a.rest)?;
         let ratio = self.ratio(&a);
         let rest = if a.rest.is_one() { Expr::int(0) } else { self.simplify(Expr::Ln(Box::new(a.rest.clone())))? };
@@ -27,13 +30,16 @@ impl Splitter<'_> {
             }
         };
         let value = rest.clone() + change.clone();
-        let split = Split { rest, change, value, rewritten: (true, true), second };
+        let split = Split { rest, change, value, rewritten: (true, true), second, jump: None };
         self.note_split(e, &split);
         Ok(split)
     }
 
     pub(super) fn exp(&mut self, e: &Expr, argument: &Expr) -> Result<Split, SplitError> {
-        let a = self.split(argument)?;
+        let a = self.part(argument)?;
+        if let Some(jump) = a.jump {
+            return Ok(self.jumping(Expr::Exp(Box::new(a.value)), jump));
+        }
         let rest = if a.rest.is_zero() { Expr::int(1) } else { self.simplify(Expr::Exp(Box::new(a.rest.clone())))? };
         let change = rest.clone() * Expr::Expm1(Box::new(a.change.clone()));
         let second = match self.order {
@@ -44,7 +50,7 @@ impl Splitter<'_> {
             }
         };
         let value = rest.clone() + change.clone();
-        let split = Split { rest, change, value, rewritten: (true, true), second };
+        let split = Split { rest, change, value, rewritten: (true, true), second, jump: None };
         self.note_split(e, &split);
         Ok(split)
     }

@@ -73,6 +73,16 @@ pub struct Split {
     pub rewritten: (bool, bool),
     /// The change of second order, where energies are split.
     pub second: Option<Second>,
+    /// Why there is no constant at rest: the value jumps there. Only `value` counts then, which may be multiplied by
+    /// what vanishes.
+    jump: Option<Jump>,
+}
+
+/// A value that jumps at rest.
+#[derive(Debug, Clone)]
+struct Jump {
+    term: Expr,
+    reason: String,
 }
 
 impl Split {
@@ -83,7 +93,7 @@ impl Split {
     /// A value whose constant at rest and change are known.
     pub fn given(rest: Expr, change: Symbol) -> Self {
         let value = rest.clone() + change.into();
-        Self { rest, change: change.into(), value, rewritten: (true, true), second: None }
+        Self { rest, change: change.into(), value, rewritten: (true, true), second: None, jump: None }
     }
 
     /// With its change to second order: `coefficient` times a linear invariant, and the remainder.
@@ -133,11 +143,22 @@ impl<'a> Splitter<'a> {
         Self { cas, quantities, rest, kernel, known: HashMap::new(), jacobian: None, order: Order::First }
     }
 
-    /// The split of an expression.
+    /// The split of an expression, whose constant at rest exists.
     ///
     /// # Errors
     /// See [`SplitError`].
     pub fn split(&mut self, e: &Expr) -> Result<Split, SplitError> {
+        let split = self.part(e)?;
+        match &split.jump {
+            Some(Jump { term, reason }) => {
+                self.refuse(term, reason, "let the branches agree where the condition changes")
+            }
+            None => Ok(split),
+        }
+    }
+
+    /// The split of a part, which may jump at rest.
+    fn part(&mut self, e: &Expr) -> Result<Split, SplitError> {
         if self.quantities.is_constant_expr(e) {
             return self.constant(e.clone());
         }
@@ -163,6 +184,16 @@ impl<'a> Splitter<'a> {
         self.known.contains_key(&s)
     }
 
+    /// A comparison as the change of its difference and the threshold that this is compared with, if a rule applies.
+    ///
+    /// # Errors
+    /// See [`SplitError`].
+    pub fn condition(&mut self, left: &Expr, right: &Expr) -> Result<Option<(Expr, Expr)>, SplitError> {
+        let difference = self.split(&(left.clone() - right.clone()))?;
+        let threshold = self.simplify(Expr::int(-1) * difference.rest)?;
+        Ok(difference.rewritten.0.then_some((difference.change, threshold)))
+    }
+
     /// An expression as text.
     pub fn print(&self, e: &Expr) -> String {
         self.text(e)
@@ -176,13 +207,20 @@ impl<'a> Splitter<'a> {
             value: rest,
             rewritten: (false, false),
             second: self.second(Second::zero),
+            jump: None,
         })
     }
 
     /// A value that vanishes at rest and is computed as it stands.
     fn opaque(&self, e: Expr) -> Split {
         let second = self.second(|| Second::of_first_order(e.clone()));
-        Split { rest: Expr::int(0), change: e.clone(), value: e, rewritten: (false, false), second }
+        Split { rest: Expr::int(0), change: e.clone(), value: e, rewritten: (false, false), second, jump: None }
+    }
+
+    /// A value that jumps at rest.
+    fn jumping(&self, value: Expr, jump: Jump) -> Split {
+        let second = self.second(Second::zero);
+        Split { rest: Expr::int(0), change: Expr::int(0), value, rewritten: (true, true), second, jump: Some(jump) }
     }
 
     fn second(&self, second: impl FnOnce() -> Second) -> Option<Second> {
@@ -234,12 +272,12 @@ impl<'a> Splitter<'a> {
             Kind::Constant(_) => self.constant(s.into())?,
             Kind::Input(..) => self.opaque(s.into()),
             Kind::Stage { value: Value::Expr(e), .. } => {
-                let split = self.split(e)?;
-                self.stage(s, e, split)
+                let split = self.part(e)?;
+                if split.jump.is_some() { split } else { self.stage(s, e, split) }
             }
             Kind::Stage { value: Value::Select { left, right, then, otherwise }, .. } => {
                 let split = self.select(s, [left, right, then, otherwise])?;
-                self.name_parts(s, split)
+                if split.jump.is_some() { split } else { self.name_parts(s, split) }
             }
         };
         self.known.insert(s, split.clone());
@@ -299,7 +337,10 @@ impl<'a> Splitter<'a> {
     fn sum(&mut self, e: &Expr, terms: &[Expr]) -> Result<Split, SplitError> {
         let mut parts = Vec::new();
         for t in terms {
-            parts.push(self.split(t)?);
+            parts.push(self.part(t)?);
+        }
+        if let Some(jump) = parts.iter().find_map(|p| p.jump.clone()) {
+            return Ok(self.jumping(total(parts.into_iter().map(|p| p.value)), jump));
         }
         let rests: Vec<Expr> = parts.iter().map(|p| p.rest.clone()).collect();
         let had_rest = parts.iter().filter(|p| !p.is_constant()).any(|p| !p.rest.is_zero());
@@ -317,7 +358,7 @@ impl<'a> Splitter<'a> {
             Order::Second => Some(self.second_of_sum(&parts, &change)?),
         };
         let cancelled = rest.is_zero() && had_rest;
-        let split = Split { rest, change, value, rewritten: (rewritten, value_rewritten), second };
+        let split = Split { rest, change, value, rewritten: (rewritten, value_rewritten), second, jump: None };
         if cancelled {
             self.note_split(e, &split);
         }
@@ -328,7 +369,10 @@ impl<'a> Splitter<'a> {
     fn select(&mut self, s: Symbol, parts: [&Expr; 4]) -> Result<Split, SplitError> {
         let [left, right, then, otherwise] = parts;
         let condition = self.split(&(left.clone() - right.clone()))?;
-        let (then_, otherwise_) = (self.split(then)?, self.split(otherwise)?);
+        let (then_, otherwise_) = (self.part(then)?, self.part(otherwise)?);
+        if let Some(jump) = then_.jump.clone().or_else(|| otherwise_.jump.clone()) {
+            return Ok(self.jumping(s.into(), jump));
+        }
         let threshold = self.simplify(Expr::int(-1) * condition.rest.clone())?;
         let difference = self.simplify(then_.rest.clone() - otherwise_.rest.clone())?;
         let name = self.quantities.get(s).name.clone();
@@ -343,11 +387,14 @@ impl<'a> Splitter<'a> {
                     (otherwise_.rest.clone(), then_.value.clone() - otherwise_.rest.clone(), otherwise_.change.clone())
                 }
                 None => {
-                    return self.refuse(
-                        &s.into(),
-                        "jumps at rest: its branches differ there, and which one counts is open",
-                        "let the branches agree where the condition changes",
-                    );
+                    let (then, otherwise) = (self.text(&then_.rest), self.text(&otherwise_.rest));
+                    let reason =
+                        format!("jumps at rest from {otherwise} to {then}, and which of the two counts is open");
+                    let left = condition.change;
+                    let (then, otherwise) = (then_.value, otherwise_.value);
+                    let value = Value::Select { left, right: threshold, then, otherwise };
+                    let value = self.quantities.add(name, Kind::Stage { value, partials: None });
+                    return Ok(self.jumping(value.into(), Jump { term: s.into(), reason }));
                 }
             }
         };
@@ -397,7 +444,7 @@ impl<'a> Splitter<'a> {
         };
         let change = choose(self, format!("{name}_change"), then_change, otherwise_change);
         let value = rest.clone() + change.clone();
-        Ok(Split { rest, change, value, rewritten, second })
+        Ok(Split { rest, change, value, rewritten, second, jump: None })
     }
 }
 

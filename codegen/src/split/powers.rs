@@ -26,11 +26,14 @@ impl Splitter<'_> {
             };
             let base = Expr::int(1) + p.into();
             return match half {
-                Expr::Number(q) if q.is_one() => self.split(&base),
+                Expr::Number(q) if q.is_one() => self.part(&base),
                 half => self.power_of(e, &base, &half),
             };
         }
-        let a = self.split(base)?;
+        let a = self.part(base)?;
+        if let Some(jump) = a.jump {
+            return Ok(self.jumping(Expr::Power(Box::new(a.value), Box::new(exponent.clone())), jump));
+        }
         let half = Rational::new(1, 2);
         match exponent {
             Expr::Number(q) if q.is_integer() => self.integer_power(e, &a, q.to_integer()),
@@ -82,6 +85,7 @@ impl Splitter<'_> {
                 change,
                 rewritten: (a.rewritten.0, a.rewritten.0),
                 second,
+                jump: None,
             });
         }
         let rest = self.simplify(power(&a.rest, n))?;
@@ -106,7 +110,7 @@ impl Splitter<'_> {
                 Some(self.second_of_function(a, &slope, curved, &change)?)
             }
         };
-        Ok(Split { rest, change, value, rewritten: (true, a.rewritten.1), second })
+        Ok(Split { rest, change, value, rewritten: (true, a.rewritten.1), second, jump: None })
     }
 
     /// 1 / (c + y) = 1/c - y / (c (c + y)).
@@ -135,7 +139,7 @@ impl Splitter<'_> {
                 Some(self.second_of_function(a, &slope, curved, &change)?)
             }
         };
-        Ok(Split { rest, change, value: over(Expr::int(1)), rewritten: (true, a.rewritten.1), second })
+        Ok(Split { rest, change, value: over(Expr::int(1)), rewritten: (true, a.rewritten.1), second, jump: None })
     }
 
     /// sqrt(c + y) = r + y / (s + r), with r = sqrt(c) and s = sqrt(c + y).
@@ -154,7 +158,7 @@ impl Splitter<'_> {
                 Some(self.second_of_function(a, &slope, curved, &change)?)
             }
         };
-        Ok(Split { rest, change, value, rewritten: (true, a.rewritten.1), second })
+        Ok(Split { rest, change, value, rewritten: (true, a.rewritten.1), second, jump: None })
     }
 
     /// (c + y)^r = c^r + c^r expm1(r log1p(y / c)).
@@ -175,6 +179,6 @@ impl Splitter<'_> {
             }
         };
         let value = rest.clone() + change.clone();
-        Ok(Split { rest, change, value, rewritten: (true, true), second })
+        Ok(Split { rest, change, value, rewritten: (true, true), second, jump: None })
     }
 }

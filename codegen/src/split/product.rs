@@ -2,7 +2,7 @@
 
 use crate::expr::Expr;
 
-use super::{Order, Split, SplitError, Splitter};
+use super::{Order, Second, Split, SplitError, Splitter};
 
 impl Splitter<'_> {
     pub(super) fn product(&mut self, factors: &[Expr]) -> Result<Split, SplitError> {
@@ -14,7 +14,7 @@ impl Splitter<'_> {
             result = Some(self.constant(scale)?);
         }
         for f in varying {
-            let f = self.split(f)?;
+            let f = self.part(f)?;
             result = Some(match result {
                 None => f,
                 Some(product) => self.times(&product, &f)?,
@@ -26,8 +26,29 @@ impl Splitter<'_> {
         }
     }
 
+    /// What vanishes at rest times a value that is bounded there.
+    fn vanishing(&self, a: &Split, bounded: &Expr) -> Split {
+        let change = a.change.clone() * bounded.clone();
+        let second = a.second.as_ref().map(|s| match s.is_whole {
+            true => Second { remainder: change.clone(), ..s.clone() },
+            false => Second::of_first_order(change.clone()),
+        });
+        let (rest, value) = (Expr::int(0), change.clone());
+        Split { rest, change, value, rewritten: (true, true), second, jump: None }
+    }
+
     pub(super) fn times(&mut self, a: &Split, b: &Split) -> Result<Split, SplitError> {
         let product = |x: &Expr, y: &Expr| x.clone() * y.clone();
+        match (&a.jump, &b.jump) {
+            (None, None) => {}
+            // What jumps is bounded: times what vanishes it vanishes.
+            (None, Some(_)) if a.rest.is_zero() => return Ok(self.vanishing(a, &b.value)),
+            (Some(_), None) if b.rest.is_zero() => return Ok(self.vanishing(b, &a.value)),
+            (jump, other) => {
+                let jump = jump.as_ref().or(other.as_ref()).expect("one of the two jumps").clone();
+                return Ok(self.jumping(product(&a.value, &b.value), jump));
+            }
+        }
         let rest = product(&a.rest, &b.rest);
         let rest = self.simplify(rest)?;
         let (change, change_rewritten) = if a.is_constant() {
@@ -50,6 +71,6 @@ impl Splitter<'_> {
             Order::First => None,
             Order::Second => Some(self.second_of_product(a, b, &change)?),
         };
-        Ok(Split { rest, change, value, rewritten: (change_rewritten, value_rewritten), second })
+        Ok(Split { rest, change, value, rewritten: (change_rewritten, value_rewritten), second, jump: None })
     }
 }

@@ -83,6 +83,7 @@ impl<'a> Splitter<'a> {
             value: s.into(),
             rewritten: (false, false),
             second: Some(second),
+            jump: None,
         };
         let linear = |s: Symbol, remainder: Expr| Second {
             linear: BTreeMap::from([(s, Expr::int(1))]),

@@ -119,7 +119,21 @@ pub fn of_symmetric(quantities: &mut Quantities, a: [Expr; 6]) -> ([Expr; 3], Fr
             rotation.vectors(quantities, "v", &mut frame, (p, q));
         }
     }
-    (diagonal, frame)
+    let squares = squared_lengths(quantities, &frame);
+    (diagonal, of_unit_length(quantities, &frame, &squares))
+}
+
+fn squared_lengths(quantities: &mut Quantities, frame: &Frame) -> [Expr; 3] {
+    std::array::from_fn(|p| stage(quantities, format!("vv{p}"), dot(&frame[p], &frame[p])))
+}
+
+/// Vectors whose squared lengths are 1 but for a few roundings, of unit length: one step of Newton's. A rotation whose
+/// cosine and sine are rounded is a rotation times a number near 1, so that lengths drift and angles do not.
+fn of_unit_length(quantities: &mut Quantities, frame: &Frame, squares: &[Expr; 3]) -> Frame {
+    std::array::from_fn(|p| {
+        let factor = stage(quantities, "unit", Expr::ratio(3, 2) - Expr::ratio(1, 2) * squares[p].clone());
+        std::array::from_fn(|k| stage(quantities, format!("n{k}"), factor.clone() * frame[p][k].clone()))
+    })
 }
 
 /// Of C = F'F, from F row by row: the columns of F are rotated until they are orthogonal (Hestenes 1958); their squared
@@ -138,6 +152,11 @@ pub fn of_columns(quantities: &mut Quantities, f: [Expr; 9]) -> ([Expr; 3], Fram
             rotation.vectors(quantities, "v", &mut frame, (p, q));
         }
     }
-    let squares = std::array::from_fn(|p| stage(quantities, format!("c{p}"), dot(&columns[p], &columns[p])));
-    (squares, frame)
+    // The columns' lengths have drifted as those of the vectors did: 1 / (1 + e) = 1 - e there.
+    let lengths = squared_lengths(quantities, &frame);
+    let squares = std::array::from_fn(|p| {
+        let drift = Expr::int(2) - lengths[p].clone();
+        stage(quantities, format!("c{p}"), dot(&columns[p], &columns[p]) * drift)
+    });
+    (squares, of_unit_length(quantities, &frame, &lengths))
 }
