@@ -1,5 +1,6 @@
 //! Whether a law is what a hyperelastic law should be: named findings with their numbers.
 
+use rayon::prelude::*;
 use serde::Serialize;
 use tensormass_codegen::ir::Number;
 
@@ -150,7 +151,7 @@ fn identities(subject: &Subject, materials: &[Material], seed: u64) -> Vec<Findi
     }
     let worst = |f: fn(&At) -> f64| {
         // NaN is as bad as can be.
-        states.iter().map(f).map(|x| if x.is_nan() { f64::INFINITY } else { x }).fold(0.0, f64::max)
+        states.par_iter().map(f).map(|x| if x.is_nan() { f64::INFINITY } else { x }).reduce(|| 0.0, f64::max)
     };
     let detail = |worst: f64, allowed: f64| format!("{worst:.1e} at {} states, {allowed:.0e} is allowed", states.len());
     let mut findings: Vec<Finding> = IDENTITIES
