@@ -20,6 +20,12 @@ pub struct At<'a> {
     pub d: Matrix,
     /// A random rotation.
     pub q: Matrix,
+    stress: Matrix,
+    tangent: [Matrix; 9],
+    /// |dP/dG|.
+    stiffness: Exact,
+    /// The greatest stress that an error of the size of G could cause: |dP/dG| |G| + |P|.
+    scale: Exact,
 }
 
 impl<'a> At<'a> {
@@ -27,28 +33,24 @@ impl<'a> At<'a> {
         let d = random.direction().map(Exact::from);
         // No component of the quaternion is 0: no axis of coordinates is special.
         let q = rotation(std::array::from_fn(|_| 1.5 + random.signed()));
-        Self { law, g, d, q }
-    }
-
-    /// The greatest stress that an error of the size of G could cause: |dP/dG| |G| + |P|.
-    fn scale(&self) -> Exact {
-        let stiffness = Exact::norm(self.law.tangent(&self.g).as_flattened());
-        stiffness.mul(&Exact::norm(&self.g)).add(&Exact::norm(&self.law.stress(&self.g)))
+        let (stress, tangent) = (law.stress(&g), law.tangent(&g));
+        let stiffness = Exact::norm(tangent.as_flattened());
+        let scale = stiffness.fma(&Exact::norm(&g), &Exact::norm(&stress));
+        Self { law, g, d, q, stress, tangent, stiffness, scale }
     }
 
     /// P : D against the derivative of W.
     pub fn energy_and_force(&self) -> f64 {
-        let power = ddot(&self.law.stress(&self.g), &self.d);
+        let power = ddot(&self.stress, &self.d);
         let rate = self.derivative(|g| vec![self.law.energy(g)]);
-        difference(&rate, &[power], &self.scale().mul(&Exact::norm(&self.d)))
+        difference(&rate, &[power], &self.scale.mul(&Exact::norm(&self.d)))
     }
 
     /// dP against the derivative of P.
     pub fn force_and_dforce(&self) -> f64 {
         let differential = self.law.differential(&self.g, &self.d);
         let rate = self.derivative(|g| self.law.stress(g).to_vec());
-        let stiffness = Exact::norm(self.law.tangent(&self.g).as_flattened());
-        difference(&rate, &differential, &stiffness.mul(&Exact::norm(&self.d)))
+        difference(&rate, &differential, &self.stiffness.mul(&Exact::norm(&self.d)))
     }
 
     /// The derivative along D: central differences over h and h / 2, extrapolated (Richardson).
@@ -66,7 +68,7 @@ impl<'a> At<'a> {
 
     /// The tangent against its transpose.
     pub fn symmetry(&self) -> f64 {
-        let t = self.law.tangent(&self.g);
+        let t = &self.tangent;
         let transposed: Vec<Exact> = (0..81).map(|k| t[k % 9][k / 9].clone()).collect();
         difference(t.as_flattened(), &transposed, &Exact::norm(t.as_flattened()))
     }
@@ -85,10 +87,10 @@ impl<'a> At<'a> {
 
     fn moved_alike(&self, turned: &Matrix, stress: impl Fn(&Matrix) -> Matrix) -> f64 {
         let found = self.law.stress(turned);
-        let wanted = stress(&self.law.stress(&self.g));
-        let (scale, size) = (self.scale(), Exact::norm(&self.g).add(&Exact::from(1.0)));
+        let wanted = stress(&self.stress);
+        let (scale, size) = (&self.scale, Exact::norm(&self.g).add(&Exact::from(1.0)));
         let [w, moved] = [&self.g, turned].map(|g| self.law.energy(g));
-        difference(&found, &wanted, &scale).max(difference(&[moved], &[w], &scale.mul(&size)))
+        difference(&found, &wanted, scale).max(difference(&[moved], &[w], &scale.mul(&size)))
     }
 
     /// The kernels `diagonal` and `cauchy` against dP and P.
@@ -100,13 +102,13 @@ impl<'a> At<'a> {
                 ddot(&self.law.differential(&self.g, &direction), &direction)
             })
             .collect();
-        let stiffness = Exact::norm(self.law.tangent(&self.g).as_flattened());
-        let diagonal = difference(&self.law.diagonal(&self.g, &n), &wanted, &stiffness.mul(&ddot(&self.d, &self.d)));
+        let diagonal =
+            difference(&self.law.diagonal(&self.g, &n), &wanted, &self.stiffness.mul(&ddot(&self.d, &self.d)));
         let f = shifted(&self.g, 1.0);
         let j = det(&f);
-        let kirchhoff = product(&self.law.stress(&self.g), &transpose(&f));
+        let kirchhoff = product(&self.stress, &transpose(&f));
         let wanted = kirchhoff.map(|x| x.div(&j));
-        let scale = self.scale().mul(&Exact::norm(&f)).div(&j.abs());
+        let scale = self.scale.mul(&Exact::norm(&f)).div(&j.abs());
         diagonal.max(difference(&self.law.cauchy(&self.g), &wanted, &scale))
     }
 
@@ -116,12 +118,12 @@ impl<'a> At<'a> {
         let count = |g: &Matrix| self.law.printed("energy", g, &[]).remove(0);
         let energy = count(&self.g).sub(&count(&rest));
         let wanted = self.law.energy(&self.g).sub(&self.law.energy(&rest));
-        let (scale, size) = (self.scale(), Exact::norm(&self.g));
+        let (scale, size) = (&self.scale, Exact::norm(&self.g));
         let stress = self.law.printed("force", &self.g, &[]);
         let differential = self.law.printed("dforce", &self.g, &[(Input::GradientIncrement, &self.d)]);
-        let stiffness = Exact::norm(self.law.tangent(&self.g).as_flattened()).mul(&Exact::norm(&self.d));
+        let stiffness = self.stiffness.mul(&Exact::norm(&self.d));
         difference(&[energy], &[wanted], &scale.mul(&size))
-            .max(difference(&stress, &self.law.stress(&self.g), &scale))
+            .max(difference(&stress, &self.stress, scale))
             .max(difference(&differential, &self.law.differential(&self.g, &self.d), &stiffness))
     }
 }

@@ -145,13 +145,16 @@ impl Material {
             .ok_or_else(|| MaterialError::NotStiff { law: subject.law.name.clone() })
     }
 
-    /// The usual material with values of the user's: `(name, value)`, an array's component as `name[k]`.
+    /// A material with values of the user's: `(name, value)`, an array's component as `name[k]`. The others are the law's
+    /// defaults, or those at the first of [`POISSON`].
     ///
     /// # Errors
     /// [`MaterialError`]: an unknown name, a value out of range.
     pub fn with(subject: &Subject, given: &[(String, f64)]) -> Result<Self, MaterialError> {
+        let defaults = subject.law.parameters.iter().all(|p| p.default.is_some());
         let mut parameters = match Self::usual(subject) {
-            Ok(material) => material.parameters,
+            Ok(material) if defaults => material.parameters,
+            Ok(material) => material.less_compressible(subject, ratio(POISSON[0])).parameters,
             // What is given may be what is missing.
             Err(_) => values(&subject.law, PLACES[0]),
         };

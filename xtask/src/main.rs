@@ -16,6 +16,7 @@ Tasks:
   law unreviewed     fail if a committed law has no committed derivation that fits its text
   reproduce tables-1-2 [--device cpu|cpu,gpu]
                      run the paper's traction test and its experiments, write docs/reproduction.md (some minutes)
+  reproduce extremes measure the accuracy of every law, write docs/extremes.md
 
 Exit status: 0 done, 2 wrong arguments, 1 a step failed or is left to do (said on the error output).";
 
@@ -35,6 +36,7 @@ fn call(arguments: &[&str]) -> Result<(), Failure> {
         ["law", "accept", name] => law::accept::call(name),
         ["law", "unreviewed"] => law::unreviewed::call(),
         ["reproduce", "tables-1-2", options @ ..] => reproduce::call(options),
+        ["reproduce", "extremes"] => reproduce::extremes::call(),
         ["help" | "-h" | "--help"] => {
             say(USAGE);
             Ok(())
@@ -42,7 +44,9 @@ fn call(arguments: &[&str]) -> Result<(), Failure> {
         [] => Err(Failure::Usage("which task?".to_string())),
         ["law", "accept", ..] => Err(Failure::Usage("`law accept` takes the name of one law".to_string())),
         ["law", "unreviewed", ..] => Err(Failure::Usage("`law unreviewed` takes no arguments".to_string())),
-        ["reproduce", ..] => Err(Failure::Usage("`reproduce` takes tables-1-2, and --device after it".to_string())),
+        ["reproduce", ..] => {
+            Err(Failure::Usage("`reproduce` takes tables-1-2, and --device after it, or extremes".to_string()))
+        }
         other => Err(Failure::Usage(format!("there is no task `{}`", other.join(" ")))),
     }
 }

@@ -1,9 +1,11 @@
-//! `cargo xtask reproduce tables-1-2`: makes docs/reproduction.md from runs of the traction test.
+//! `cargo xtask reproduce tables-1-2`: makes docs/reproduction.md from runs of the traction test; `extremes`: the accuracy
+//! of laws.
 
 mod chain;
 mod conclusions;
 mod document;
 mod experiments;
+pub mod extremes;
 mod paper;
 mod runs;
 mod series;

@@ -1,0 +1,72 @@
+//! A derivation with one slip in it fails the findings that the slip is about.
+
+use tensormass_codegen::derivation::Derivation;
+use tensormass_codegen::ir::{KernelIr, Op};
+use tensormass_kernels::laws;
+use tensormass_lawbench::check::check;
+use tensormass_lawbench::extremes::Options;
+use tensormass_lawbench::subject::Subject;
+
+const ENERGY: &str = "force is the derivative of energy";
+const FORCE: &str = "dforce is the derivative of force";
+const SYMMETRY: &str = "symmetric tangent";
+const OTHERS: &str = "diagonal and Cauchy stress agree with tangent and stress";
+const ACCURATE: &str = "accurate in f32, f64 and WGSL";
+
+/// A slip: the kernel, what happens to it, and the findings that have to fail.
+type Slip = (&'static str, fn(&mut KernelIr), &'static [&'static str]);
+
+/// Two components of the first output change places.
+fn swapped(ir: &mut KernelIr) {
+    ir.outputs[0].1.swap(1, 2);
+}
+
+/// The last operation is another one.
+fn altered(ir: &mut KernelIr) {
+    let last = ir.outputs[0].1[0].index();
+    ir.values[last].op = match ir.values[last].op {
+        Op::Add(a, b) => Op::Sub(a, b),
+        Op::Mul(a, b) | Op::Sub(a, b) => Op::Add(a, b),
+        other => panic!("no slip is known for {other:?}"),
+    };
+}
+
+const SLIPS: [Slip; 5] = [
+    ("energy", altered, &[ENERGY]),
+    ("force", swapped, &[ENERGY, FORCE]),
+    ("dforce", swapped, &[FORCE, SYMMETRY]),
+    ("diagonal", swapped, &[OTHERS]),
+    ("cauchy", swapped, &[OTHERS]),
+];
+
+fn failed(subject: &Subject, samples: usize) -> Vec<&'static str> {
+    let options = Options { samples, seed: 5 };
+    check(subject, options, Err("not asked for".into())).expect("a material").failed()
+}
+
+#[test]
+fn a_slip_is_found() {
+    for entry in laws() {
+        for (kernel, slip, wanted) in SLIPS {
+            let mut subject = Subject::of_build(entry);
+            let Derivation { kernels, .. } = &mut subject.derivation;
+            // The form that is not split is the one that is judged.
+            let far = format!("{kernel}_far");
+            let names: Vec<String> = kernels.iter().map(|k| k.ir().name.clone()).collect();
+            let name = if names.contains(&far) { far.as_str() } else { kernel };
+            let at = names.iter().position(|n| n == name).expect("every law has it");
+            let mut ir = kernels[at].ir().clone();
+            slip(&mut ir);
+            kernels[at] = ir.validate().expect("a slip leaves a kernel a kernel");
+            let found = failed(&subject, 0);
+            assert!(wanted.iter().all(|w| found.contains(w)), "{}, {kernel}: {found:?}", entry.info.name);
+        }
+    }
+}
+
+#[test]
+fn lost_digits_are_found() {
+    let [law, derivation] = [include_str!("data/loses_digits.rs"), include_str!("data/derived/loses_digits.ir")];
+    let subject = Subject::from_texts("loses_digits.rs", law, derivation).expect("a law and its derivation");
+    assert_eq!(failed(&subject, 1), [ACCURATE]);
+}
