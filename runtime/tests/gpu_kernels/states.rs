@@ -18,7 +18,7 @@ use tensormass_testing::random::Rng;
 use tensormass_testing::rounding::{Bounded, SINGLE, Wgsl};
 
 /// Bounds above this part of the values, on average, would prove nothing. Textbook energies lose half the digits of f32.
-const USEFUL: f64 = 1.0 / 256.0;
+const USEFUL: f64 = 1.0 / 64.0;
 
 /// A number as WGSL computes it.
 pub type Bound = Bounded<Wgsl>;

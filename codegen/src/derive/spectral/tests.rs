@@ -239,6 +239,12 @@ fn powers_of_the_principal_stretches() {
             }
         }
     }
+    // Many frames far apart from the axes, where the last sweep counts.
+    for k in 1..400 {
+        let angles = [0.37 * f64::from(k), 1.3 * f64::from(k)];
+        [6.0, -2.0].iter().for_each(|a| at(&state([10.0, 3.0, -0.8], angles), *a));
+        at(&state([0.1, 0.02, -0.1], angles), 1.3);
+    }
     at(&[[0.0; 3]; 3], 1.3);
     eprintln!("worst shares of the tolerance: by F in f32 and f64, by A in f32 and f64: {worst:.2?}");
 }
