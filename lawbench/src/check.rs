@@ -8,7 +8,7 @@ use crate::edge::edge;
 use crate::exact::{ExactLaw, exact};
 use crate::extremes::{ExtremesError, Options, extremes};
 use crate::identities::{At, DIFFERENCE, IDENTITY};
-use crate::material::{Material, is_direction};
+use crate::material::Material;
 use crate::number::Exact;
 use crate::states::{ROTATIONS, Random, STRAINS};
 use crate::subject::Subject;
@@ -174,7 +174,7 @@ fn identities(subject: &Subject, materials: &[Material], seed: u64) -> Vec<Findi
     let small_strain = objectivity > IDENTITY;
     findings.push(if isotropy <= IDENTITY {
         finding("isotropic", true, detail(isotropy, IDENTITY))
-    } else if small_strain || subject.law.parameters.iter().any(is_direction) {
+    } else if small_strain || subject.law.parameters.iter().any(|p| p.direction) {
         note("isotropic", format!("no: {isotropy:.1e} of the stress under rotations of the body at rest"))
     } else {
         finding("isotropic", false, detail(isotropy, IDENTITY))

@@ -197,7 +197,7 @@ impl Material {
         let distance = |m: &Self| (m.moduli.ratio() / wanted).ln().abs().max(1e-3);
         let detour = |m: &Self| (m.moduli.shear / self.moduli.shear).ln().abs();
         let mut best = self.clone();
-        for (at, (_, parameter)) in names(&subject.law).iter().enumerate().filter(|(_, (_, p))| !is_direction(p)) {
+        for (at, (_, parameter)) in names(&subject.law).iter().enumerate().filter(|(_, (_, p))| !p.direction) {
             let with = |x: f64| {
                 let mut parameters = self.parameters.clone();
                 parameters[at] = x;
@@ -265,16 +265,11 @@ fn between((low, high): (f64, f64), place: f64) -> f64 {
     x.clamp(low, high)
 }
 
-/// Whether a parameter is a direction: three pure numbers from -1 to 1, a unit vector.
-pub(crate) fn is_direction(p: &Parameter) -> bool {
-    p.len == 3 && p.unit.text == "1" && p.range == (-1.0, 1.0)
-}
-
 fn values(law: &Law, place: f64) -> Vec<f64> {
     let one = |p: &Parameter| match &p.default {
         Some(values) => values.clone(),
         // A unit vector that is no axis of coordinates.
-        None if is_direction(p) => [1.0, 2.0, 2.0].map(|x| x / 3.0).to_vec(),
+        None if p.direction => [1.0, 2.0, 2.0].map(|x| x / 3.0).to_vec(),
         None => vec![four_digits(between(p.range, place)); p.len],
     };
     law.parameters.iter().flat_map(one).collect()
