@@ -68,6 +68,7 @@ fn directions_matter() {
 /// fibres in tension from those in compression.
 #[test]
 fn states_lie_on_both_sides_of_selections() {
+    let mut laws_with_selections = 0;
     for law in laws() {
         let name = law.info.name;
         let mut above: Vec<u64> = Vec::new();
@@ -78,8 +79,13 @@ fn states_lie_on_both_sides_of_selections() {
             above.resize(branches.len(), 0);
             above.iter_mut().zip(branches).for_each(|(count, branch)| *count += u64::from(branch));
         }
-        assert_eq!(above.is_empty(), law.info.operations.iter().all(|o| o.selects == 0), "{name}");
+        // Those that the law's author wrote, not those of principal axes.
+        if !["pos(", "select("].iter().any(|call| law.source.law.contains(call)) || above.is_empty() {
+            continue;
+        }
+        laws_with_selections += 1;
         let tenth = STATES / 10;
         assert!(above.iter().all(|n| (tenth..=STATES - tenth).contains(n)), "{name}: {above:?} of {STATES}");
     }
+    assert!(laws_with_selections > 0, "no law of this build has selections");
 }

@@ -111,7 +111,7 @@ fn show_prints_what_json_has() {
         law["constants"].as_array().expect("an array").iter().for_each(|c| shows(c.as_str().expect("a text")));
         for operations in law["operations"].as_array().expect("an array") {
             let kernel = text(operations, "kernel");
-            let line = page.lines().rfind(|l| l.trim().starts_with(kernel)).expect(kernel);
+            let line = page.lines().rfind(|l| l.split_whitespace().next() == Some(kernel)).expect(kernel);
             let sum = operations["arithmetic"].to_string();
             assert_eq!(line.split_whitespace().nth(4), Some(sum.as_str()), "{name}: {line}");
         }

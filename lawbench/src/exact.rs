@@ -4,6 +4,7 @@ use tensormass_codegen::derivation::Derivation;
 use tensormass_codegen::ir::{Input, Number};
 
 use crate::evaluate::{printed, textbook};
+use crate::gate::is_undecided;
 use crate::lanes::tangent;
 use crate::material::Material;
 use crate::number::Exact;
@@ -20,6 +21,11 @@ pub struct ExactLaw<'a> {
 impl<'a> ExactLaw<'a> {
     pub fn new(derivation: &'a Derivation, material: &Material) -> Self {
         Self { derivation, constants: material.exact_constants(derivation) }
+    }
+
+    /// Whether a selection of the law is not decided by G.
+    pub fn is_undecided(&self, gradient: &[f64; 9], direction: &[f64; 9]) -> bool {
+        is_undecided(self.derivation, &self.constants, gradient, direction)
     }
 
     fn values(&self, kernel: &str, g: &Matrix, more: &[(Input, &[Exact])]) -> Vec<Exact> {

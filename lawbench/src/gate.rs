@@ -9,11 +9,12 @@
 //! |W^ - W|   <= k u (|P| |G| + |W|) + (k u)^2 |dP/dG| |G|^2 / 2        k = 8
 //! ```
 //!
-//! in Frobenius norms; WGSL is granted twice as much. A state counts where it is inside the law's domain, and the values
-//! and their bounds are normal numbers of the precision.
+//! in Frobenius norms; WGSL is granted twice as much. A state counts where it is inside the law's domain, the values and
+//! their bounds are normal numbers of the precision, and the tangent does not jump within the rounding of G: where a
+//! selection of the law is not decided by the input, nothing is promised.
 
 use tensormass_codegen::derivation::Derivation;
-use tensormass_codegen::ir::{Input, Number};
+use tensormass_codegen::ir::{Input, Number, Op};
 
 use crate::evaluate::textbook;
 use crate::lanes::tangent;
@@ -97,6 +98,8 @@ pub struct Reference {
     second: Exact,
     /// |dP/dG| |G| / |P|.
     pub condition: f64,
+    /// Whether the tangent jumps within the rounding of G in single and in double precision.
+    jumps: [bool; 2],
 }
 
 impl Reference {
@@ -135,8 +138,11 @@ impl Reference {
         let second = pull.mul(&g).mul(&Exact::from(0.5));
         let condition = pull.div(&p).to_f64();
         let values = [force.value, vec![energy], differential];
+        let jumps = [f32::EPSILON.into(), f64::EPSILON].map(|epsilon: f64| {
+            selects(derivation) && jumps(derivation, constants, &here, (gradient, direction), epsilon, &curvature)
+        });
         let finite = values.iter().flatten().chain(&first).all(Exact::is_finite);
-        finite.then_some(Self { values, first, second, condition })
+        finite.then_some(Self { values, first, second, condition, jumps })
     }
 
     /// The exact value.
@@ -146,6 +152,9 @@ impl Reference {
 
     /// How far a machine's value is off; none where the gate makes no promise.
     pub fn measure(&self, machine: Machine, quantity: Quantity, computed: &[f64]) -> Option<Measure> {
+        if self.jumps[usize::from(machine == Machine::F64)] {
+            return None;
+        }
         let (round_off, least, greatest) = machine.numbers();
         let granted = if machine == Machine::Wgsl { 2.0 } else { 1.0 };
         let k = granted * if quantity == Quantity::W { 8.0 } else { 4.0 };
@@ -167,6 +176,47 @@ impl Reference {
         let error = Exact::norm(&error);
         Some(Measure { gate: error.div(&bound).to_f64(), relative: error.div(&size).to_f64() })
     }
+}
+
+/// Whether a selection of the law is not decided by G in double precision, so that the tangent has no one value there.
+pub fn is_undecided(derivation: &Derivation, constants: &[Exact], gradient: &[f64; 9], direction: &[f64; 9]) -> bool {
+    if !selects(derivation) {
+        return false;
+    }
+    let here = tangent(derivation, constants, &gradient.map(Exact::from));
+    // Without the curvature's part: a state too many is left out rather than one too few.
+    jumps(derivation, constants, &here, (gradient, direction), f64::EPSILON, &Exact::zero())
+}
+
+/// Whether the law has selections.
+fn selects(derivation: &Derivation) -> bool {
+    let force = derivation.point("force");
+    force.textbook().ir().values.iter().any(|d| matches!(d.op, Op::Select(..)))
+}
+
+/// Whether the tangent at eight roundings from G, in either sense of the direction, is another one than its derivative
+/// says, by more than rounding.
+fn jumps(
+    derivation: &Derivation,
+    constants: &[Exact],
+    here: &[[Exact; 9]; 9],
+    (gradient, direction): (&[f64; 9], &[f64; 9]),
+    epsilon: f64,
+    curvature: &Exact,
+) -> bool {
+    let norm = |x: &[f64; 9]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let radius = 8.0 * epsilon * norm(gradient) / norm(direction);
+    let explained = curvature.mul(&Exact::from(4.0 * radius));
+    let rounding = Exact::norm(here.as_flattened()).mul(&Exact::from(8.0 * epsilon));
+    let bound = explained.add(&rounding);
+    [radius, -radius].iter().any(|step| {
+        let step = Exact::from(*step);
+        let there = std::array::from_fn(|k| Exact::from(direction[k]).fma(&step, &Exact::from(gradient[k])));
+        let there = tangent(derivation, constants, &there);
+        let difference: Vec<Exact> =
+            there.as_flattened().iter().zip(here.as_flattened()).map(|(a, b)| a.sub(b)).collect();
+        Exact::norm(&difference).greater(&bound)
+    })
 }
 
 #[cfg(test)]

@@ -255,8 +255,14 @@ fn four_digits(x: f64) -> f64 {
     format!("{x:.3e}").parse().unwrap_or(x)
 }
 
-/// A place of a range, 0 to 1: geometric where both ends are of one sign, arithmetic otherwise.
+/// A place of a range, 0 to 1: geometric where both ends are of one sign, arithmetic otherwise. A range of magnitudes
+/// from 0, as that of a modulus that may be left out, begins at 1.
 fn between((low, high): (f64, f64), place: f64) -> f64 {
+    let (low, high) = match (low, high) {
+        (0.0, high) if high > 1.0 => (1.0, high),
+        (low, 0.0) if low < -1.0 => (low, -1.0),
+        other => other,
+    };
     let x = if low * high > 0.0 {
         low.signum() * (low.abs().ln() * (1.0 - place) + high.abs().ln() * place).exp()
     } else {

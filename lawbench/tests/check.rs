@@ -27,6 +27,7 @@ fn altered(ir: &mut KernelIr) {
     ir.values[last].op = match ir.values[last].op {
         Op::Add(a, b) => Op::Sub(a, b),
         Op::Mul(a, b) | Op::Sub(a, b) => Op::Add(a, b),
+        Op::Select(l, r, a, b) => Op::Select(r, l, a, b),
         other => panic!("no slip is known for {other:?}"),
     };
 }
@@ -56,6 +57,10 @@ fn a_slip_is_found() {
             let name = if names.contains(&far) { far.as_str() } else { kernel };
             let at = names.iter().position(|n| n == name).expect("every law has it");
             let mut ir = kernels[at].ir().clone();
+            // Those of principal axes take minutes in 448 bits.
+            if ir.values.len() > 1000 {
+                continue;
+            }
             slip(&mut ir);
             kernels[at] = ir.validate().expect("a slip leaves a kernel a kernel");
             let found = failed(&subject, 0);

@@ -61,7 +61,7 @@ impl<'a> Energy<'a> {
         each.flat_map(|(symbols, p)| symbols.iter().map(|&s| (s, p.range))).collect()
     }
 
-    /// From here on finite strains are expressed in C itself instead of A = C - I: the textbook form, which keeps its
+    /// From here on isotropic invariants of finite strains are expressed in C itself instead of A = C - I: the textbook form, which keeps its
     /// digits where a body is compressed to almost nothing.
     pub fn far_from_rest(&mut self) {
         self.finite = Base::C;
@@ -156,10 +156,7 @@ impl<'a> Energy<'a> {
         let two = Rational::from_integer(2);
         Ok(match i {
             ast::Invariant::I1 => self.trace(&c)?,
-            ast::Invariant::I2 => {
-                let e = Expr::ratio(1, 2) * (self.trace(&c)?.pow(two) - self.ddot(&c, &c)?);
-                self.cas.expand(&e)?
-            }
+            ast::Invariant::I2 => self.basic(Invariant::Second)?,
             ast::Invariant::I3 => self.basic(Invariant::J)?.pow(two),
             ast::Invariant::J => self.basic(Invariant::J)?,
             ast::Invariant::I1bar => {
@@ -168,27 +165,17 @@ impl<'a> Energy<'a> {
             ast::Invariant::I2bar => {
                 self.basic(Invariant::J)?.pow(Rational::new(-4, 3)) * self.invariant(ast::Invariant::I2)?
             }
-            ast::Invariant::I4(a) => {
-                let form = Invariant::Fibre(self.finite, self.direction(a));
-                self.from_identity() + self.basic(form)?
-            }
+            ast::Invariant::I4(a) => Expr::int(1) + self.basic(Invariant::Fibre(self.direction(a)))?,
             ast::Invariant::I5(a) => {
                 let a = self.direction(a);
-                let square = self.basic(Invariant::FibreSquare(self.finite, a))?;
-                if self.finite == Base::C {
-                    return Ok(square);
-                }
-                let linear = self.basic(Invariant::Fibre(self.finite, a))?;
-                Expr::Sum(vec![Expr::int(1), Expr::int(2) * linear, square])
+                let linear = self.basic(Invariant::Fibre(a))?;
+                Expr::Sum(vec![Expr::int(1), Expr::int(2) * linear, self.basic(Invariant::FibreSquare(a))?])
             }
             ast::Invariant::I8(a, b) => {
                 let (a, b) = (self.direction(a), self.direction(b));
-                let pair = self.basic(Invariant::FibrePair(self.finite, a, b))?;
-                if self.finite == Base::C {
-                    return Ok(pair);
-                }
                 let cosine = Expr::Sum(a.iter().zip(&b).map(|(&x, &y)| Expr::from(x) * y.into()).collect());
-                self.quantity("cosine", Value::Expr(cosine)) + pair
+                let cosine = self.quantity("cosine", Value::Expr(cosine));
+                cosine + self.basic(Invariant::FibrePair(a, b))?
             }
             ast::Invariant::I4bar(a) => {
                 self.basic(Invariant::J)?.pow(Rational::new(-2, 3)) * self.invariant(ast::Invariant::I4(a))?
@@ -197,11 +184,6 @@ impl<'a> Energy<'a> {
                 self.basic(Invariant::J)?.pow(Rational::new(-4, 3)) * self.invariant(ast::Invariant::I5(a))?
             }
         })
-    }
-
-    /// What a . A . a lacks to a . C . a.
-    fn from_identity(&self) -> Expr {
-        Expr::int(i128::from(self.finite == Base::A))
     }
 
     fn tensor(&mut self, t: &Tensor) -> Result<Combination, DeriveError> {

@@ -1,4 +1,4 @@
-//! The stages of the invariants with fibre directions, over the strain A = C - I, or over C itself far from rest.
+//! The stages of the invariants with fibre directions, over the strain A = C - I.
 //!
 //! What depends on the directions alone, the components of sym(a (x) b), is a constant of the material and computed
 //! once. A direction is a unit vector: a . C . a = 1 + a . A . a, and the 1 cancels exactly where it has to.
@@ -15,9 +15,9 @@ fn name(quantities: &Quantities, d: Direction) -> String {
 
 /// a . A . b, with the six components of A. The sum over the off-diagonal components is a stage of its own: so the
 /// constants that multiply A are those that multiply the stress, six in all.
-pub fn pair(quantities: &mut Quantities, tensor: &str, strain: &[Symbol; 6], a: Direction, b: Direction) -> Symbol {
+pub fn pair(quantities: &mut Quantities, strain: &[Symbol; 6], a: Direction, b: Direction) -> Symbol {
     let (first, second) = (name(quantities, a), name(quantities, b));
-    let label = format!("{first}_{tensor}_{second}");
+    let label = format!("{first}_A_{second}");
     let product = if a == b { first } else { format!("{first}_{second}") };
     let mut terms = Vec::new();
     for (&(i, j), &component) in SYMMETRIC.iter().zip(strain) {
@@ -36,7 +36,7 @@ pub fn pair(quantities: &mut Quantities, tensor: &str, strain: &[Symbol; 6], a: 
 }
 
 /// a . A^2 . a = |A a|^2.
-pub fn square(quantities: &mut Quantities, tensor: &str, strain: &[Symbol; 6], a: Direction) -> Symbol {
+pub fn square(quantities: &mut Quantities, strain: &[Symbol; 6], a: Direction) -> Symbol {
     let label = name(quantities, a);
     let at = |i: usize, j: usize| {
         let k = SYMMETRIC.iter().position(|&(x, y)| (x, y) == (i.min(j), i.max(j)));
@@ -44,8 +44,8 @@ pub fn square(quantities: &mut Quantities, tensor: &str, strain: &[Symbol; 6], a
     };
     let squares = [0, 1, 2].map(|i| {
         let row = (0..3).map(|j| Expr::from(a[j]) * at(i, j)).collect();
-        let image = quantities.stage(format!("{tensor}{label}{i}"), Expr::Sum(row));
+        let image = quantities.stage(format!("A{label}{i}"), Expr::Sum(row));
         Expr::from(image).pow(Rational::from_integer(2))
     });
-    quantities.stage(format!("{tensor}_{label}_square"), Expr::Sum(squares.to_vec()))
+    quantities.stage(format!("{label}_square"), Expr::Sum(squares.to_vec()))
 }

@@ -9,8 +9,8 @@ use super::{DeriveError, Session};
 
 /// Splitting serves up to E:E = 4, that is A:A = 16.
 const GREATEST_STRAIN: (i128, i128) = (16, 1);
-/// With principal stretches, whose squares are 1 + a_p with errors of the greatest a_p: up to A:A = 1/4.
-const GREATEST_STRETCH: (i128, i128) = (1, 4);
+/// With principal stretches, whose squares are 1 + a_p with errors of the greatest a_p: up to A:A = 4.
+const GREATEST_STRETCH: (i128, i128) = (4, 1);
 
 /// The energy near rest.
 pub struct NearEnergy {
@@ -51,6 +51,10 @@ impl Session {
             let p = self.quantities.stage("p", Expr::from(trace) + second.into());
             leaves.jacobian = Some((j, p, trace, second.into()));
         }
+        if let Some((second, trace, remainder, change)) = self.near_second()? {
+            let split = Split::given(Expr::int(3), change).to_second_order(trace, Expr::int(2), remainder);
+            leaves.others.push((second, split));
+        }
         let sums = self.strain.near_stretch_sums(&mut self.quantities);
         if !sums.is_empty() {
             let trace = self.strain.invariant(&mut self.cas, &mut self.quantities, Invariant::Trace(Base::A))?;
@@ -63,7 +67,7 @@ impl Session {
             match invariant {
                 Invariant::Trace(_) | Invariant::Fibre(..) | Invariant::FibrePair(..) => leaves.linear.push(s),
                 Invariant::Ddot(..) | Invariant::Det(_) | Invariant::FibreSquare(..) => leaves.quadratic.push(s),
-                Invariant::J | Invariant::StretchSum(_) => {}
+                Invariant::J | Invariant::StretchSum(_) | Invariant::Second => {}
             }
         }
         let energy = self.energy.clone();
@@ -80,12 +84,16 @@ impl Session {
         let deformation = *self.strain.deformation();
         let margin = self.margin.clone();
         let sums = self.strain.near_stretch_sums(&mut self.quantities);
+        let second = self.near_second()?;
         let mut splitter = Splitter::first(&mut self.cas, &mut self.quantities, &mut self.rest, "force");
         for s in sums {
             splitter.give(s.sum, Split::given(Expr::int(3), s.change));
             for (k, (moment, change)) in s.moment.into_iter().zip(s.moment_change).enumerate() {
                 splitter.give(moment, Split::given(Expr::int(i128::from(k < 3)), change));
             }
+        }
+        if let Some((second, _, _, change)) = second {
+            splitter.give(second, Split::given(Expr::int(3), change));
         }
         let mut near = Vec::new();
         let mut rewritten = false;
@@ -115,6 +123,20 @@ impl Session {
         let bounded = !uses_j || self.strain.has_stretch_sums();
         let holds = self.near_rest(uses_j.then_some(j), bounded)?;
         Ok(Some(NearStress { stress, margin, cauchy, holds }))
+    }
+
+    /// I2, if in use, and tr A, II(A), 2 tr A + II(A): I2 = 3 + 2 tr A + II(A).
+    fn near_second(&mut self) -> Result<Option<(Symbol, Symbol, Symbol, Symbol)>, DeriveError> {
+        let used = self.strain.invariants();
+        let Some(&(_, second)) = used.iter().find(|(i, _)| *i == Invariant::Second) else { return Ok(None) };
+        let (cas, quantities) = (&mut self.cas, &mut self.quantities);
+        let [trace, square] = [Invariant::Trace(Base::A), Invariant::Ddot(Base::A, Base::A)]
+            .map(|i| self.strain.invariant(cas, quantities, i));
+        let (trace, square) = (trace?, square?);
+        let remainder = Expr::ratio(1, 2) * (Expr::from(trace).pow(2.into()) - square.into());
+        let remainder = self.quantities.stage("I2_remainder", remainder);
+        let change = self.quantities.stage("I2_change", Expr::int(2) * Expr::from(trace) + remainder.into());
+        Ok(Some((second, trace, remainder, change)))
     }
 
     /// What tangents compute otherwise than the textbook, although nothing in them cancels, as pairs of a quantity and

@@ -30,7 +30,7 @@ pub enum Base {
 
 impl Base {
     /// The tensor's name in generated text.
-    pub fn label(self) -> &'static str {
+    fn label(self) -> &'static str {
         match self {
             Base::A => "A",
             Base::Eps => "eps",
@@ -48,16 +48,19 @@ pub enum Invariant {
     Ddot(Base, Base),
     /// det of a base tensor.
     Det(Base),
+    /// I2 = tr cof C, of the right Cauchy-Green tensor: computed as K:K with the cofactors K of F, in which nothing
+    /// cancels, and differentiated as a function of A.
+    Second,
     /// det F.
     J,
     /// The sum of the principal stretches to a power, by its number among those in use.
     StretchSum(usize),
-    /// a . A . a of a direction a and a base tensor A.
-    Fibre(Base, Direction),
+    /// a . A . a of a direction a.
+    Fibre(Direction),
     /// a . A^2 . a.
-    FibreSquare(Base, Direction),
+    FibreSquare(Direction),
     /// a . A . b of two directions.
-    FibrePair(Base, Direction, Direction),
+    FibrePair(Direction, Direction),
 }
 
 /// The components of a unit vector of the body at rest: parameters, hence constants of the material.
@@ -74,9 +77,9 @@ impl Invariant {
         match self {
             Invariant::Trace(b) | Invariant::Det(b) => b == base,
             Invariant::Ddot(a, b) => a == base || b == base,
-            Invariant::StretchSum(_) => base == Base::A,
+            Invariant::StretchSum(_) | Invariant::Second => base == Base::A,
             Invariant::J => false,
-            Invariant::Fibre(b, _) | Invariant::FibreSquare(b, _) | Invariant::FibrePair(b, ..) => b == base,
+            Invariant::Fibre(_) | Invariant::FibreSquare(_) | Invariant::FibrePair(..) => base == Base::A,
         }
     }
 
@@ -109,6 +112,7 @@ pub struct Strain {
     deformation: [Symbol; 9],
     bases: BTreeMap<Base, [Symbol; 6]>,
     jacobian: Option<Symbol>,
+    cofactors: Option<[Symbol; 9]>,
     /// The exponents of the sums of principal stretches, and the decomposition that they share.
     exponents: Vec<Expr>,
     spectrum: Option<Spectrum>,
@@ -135,6 +139,7 @@ impl Strain {
             deformation,
             bases: BTreeMap::new(),
             jacobian: None,
+            cofactors: None,
             exponents: vec![],
             spectrum: None,
             near_spectrum: None,
@@ -191,6 +196,12 @@ impl Strain {
         Ok(components)
     }
 
+    /// The cofactors K = dJ/dF.
+    fn cofactors(&mut self, cas: &mut Cas, quantities: &mut Quantities) -> [Symbol; 9] {
+        self.jacobian(cas, quantities);
+        self.cofactors.expect("J has made them")
+    }
+
     /// J = det F, and with it the cofactors K = dJ/dF.
     pub fn jacobian(&mut self, cas: &mut Cas, quantities: &mut Quantities) -> Symbol {
         if let Some(j) = self.jacobian {
@@ -214,7 +225,7 @@ impl Strain {
         let value = Expr::Sum((0..3).map(|k| Expr::from(f[k]) * cofactors[k].into()).collect());
         let partials = f.iter().zip(cofactors).map(|(&s, k)| (s, k.into())).collect();
         let j = quantities.add("J", Kind::Stage { value: Value::Expr(value), partials: Some(partials) });
-        self.jacobian = Some(j);
+        (self.jacobian, self.cofactors) = (Some(j), Some(cofactors));
         j
     }
 
@@ -231,23 +242,41 @@ impl Strain {
         let label = Base::label;
         let symbol = match invariant {
             Invariant::J => self.jacobian(cas, quantities),
+            Invariant::Second => {
+                let trace = self.invariant(cas, quantities, Invariant::Trace(Base::A))?;
+                let a = self.base(cas, quantities, Base::A)?;
+                let cofactors = self.cofactors(cas, quantities);
+                // dI2/dC = I1 I - C = (2 + tr A) I - A; an off-diagonal component stands for two.
+                let partials = SYMMETRIC.iter().zip(a).map(|(&(i, j), component)| {
+                    let e = if i == j {
+                        Expr::Sum(vec![Expr::int(2), trace.into(), Expr::int(-1) * component.into()])
+                    } else {
+                        Expr::int(-2) * component.into()
+                    };
+                    (component, e)
+                });
+                let partials = Some(partials.collect());
+                let squares = cofactors.iter().map(|&k| Expr::from(k).pow(Rational::from_integer(2)));
+                let value = Value::Expr(Expr::Sum(squares.collect()));
+                quantities.add("I2", Kind::Stage { value, partials })
+            }
             Invariant::StretchSum(k) => {
                 let c = self.base(cas, quantities, Base::A)?;
                 let spectrum =
                     self.spectrum.get_or_insert_with(|| Spectrum::of_deformation(quantities, self.deformation, c));
                 spectrum.stretch_sum(quantities, &self.exponents[k])
             }
-            Invariant::Fibre(b, d) => {
-                let c = self.base(cas, quantities, b)?;
-                fibre::pair(quantities, b.label(), &c, d, d)
+            Invariant::Fibre(d) => {
+                let c = self.base(cas, quantities, Base::A)?;
+                fibre::pair(quantities, &c, d, d)
             }
-            Invariant::FibrePair(b, d, e) => {
-                let c = self.base(cas, quantities, b)?;
-                fibre::pair(quantities, b.label(), &c, d, e)
+            Invariant::FibrePair(d, e) => {
+                let c = self.base(cas, quantities, Base::A)?;
+                fibre::pair(quantities, &c, d, e)
             }
-            Invariant::FibreSquare(b, d) => {
-                let c = self.base(cas, quantities, b)?;
-                fibre::square(quantities, b.label(), &c, d)
+            Invariant::FibreSquare(d) => {
+                let c = self.base(cas, quantities, Base::A)?;
+                fibre::square(quantities, &c, d)
             }
             Invariant::Trace(b) => {
                 let c = self.base(cas, quantities, b)?;
