@@ -146,7 +146,9 @@ fn identities(subject: &Subject, materials: &[Material], seed: u64) -> Vec<Findi
         for (s, strain) in STRAINS.iter().enumerate() {
             for (k, r) in TURNS.iter().enumerate() {
                 let mut random = Random::new(&[seed, 1, m as u64, s as u64, *r as u64]);
-                let gradient = random.gradient(*strain, ROTATIONS[*r], s + k);
+                // Equal stretches are where the selections of fibres that bear no compression change.
+                let kind = if law.selects() { 0 } else { s + k };
+                let gradient = random.gradient(*strain, ROTATIONS[*r], kind);
                 let g = exact(&gradient);
                 if law.inside(&g) && !law.is_undecided(&gradient, &random.direction()) {
                     states.push(At::new(law, g, &mut random));

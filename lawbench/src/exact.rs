@@ -4,7 +4,7 @@ use tensormass_codegen::derivation::Derivation;
 use tensormass_codegen::ir::{Input, Number};
 
 use crate::evaluate::{printed, textbook};
-use crate::gate::is_undecided;
+use crate::gate::{is_undecided, selects};
 use crate::lanes::tangent;
 use crate::material::Material;
 use crate::number::Exact;
@@ -21,6 +21,11 @@ pub struct ExactLaw<'a> {
 impl<'a> ExactLaw<'a> {
     pub fn new(derivation: &'a Derivation, material: &Material) -> Self {
         Self { derivation, constants: material.exact_constants(derivation) }
+    }
+
+    /// Whether the law has selections.
+    pub fn selects(&self) -> bool {
+        selects(self.derivation)
     }
 
     /// Whether a selection of the law is not decided by G.

@@ -189,7 +189,7 @@ pub fn is_undecided(derivation: &Derivation, constants: &[Exact], gradient: &[f6
 }
 
 /// Whether the law has selections.
-fn selects(derivation: &Derivation) -> bool {
+pub fn selects(derivation: &Derivation) -> bool {
     let force = derivation.point("force");
     force.textbook().ir().values.iter().any(|d| matches!(d.op, Op::Select(..)))
 }
@@ -244,6 +244,9 @@ mod tests {
                     let exact: Vec<f64> = reference.value(quantity).iter().map(Exact::to_f64).collect();
                     let rounded: Vec<f64> = exact.iter().map(|x| f64::from(*x as f32)).collect();
                     let gate = |values: &[f64]| reference.measure(Machine::F32, quantity, values).expect("normal").gate;
+                    if reference.jumps[0] {
+                        continue;
+                    }
                     assert!(gate(&rounded) <= 1.0, "{} {quantity:?}", entry.info.name);
                     let unit = k * f64::from(f32::EPSILON) / 2.0 * reference.first[quantity as usize].to_f64();
                     // W's bound is greater by its part of second order.

@@ -317,6 +317,9 @@ mod tests {
             let names = names(&subject.law);
             let at = |name: &str| names.iter().position(|(n, _)| n == name);
             let (Some(young), Some(poisson)) = (at("young"), at("poisson")) else { continue };
+            if subject.law.parameters.iter().any(|p| p.direction) {
+                continue;
+            }
             let material = Material::with(&subject, &[("young".into(), 2e5), ("poisson".into(), 0.25)]).expect("valid");
             let (e, nu) = (material.parameters[young], material.parameters[poisson]);
             let (mu, bulk) = (e / (2.0 * (1.0 + nu)), e / (3.0 * (1.0 - 2.0 * nu)));

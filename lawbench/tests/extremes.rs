@@ -45,7 +45,9 @@ fn dforce_of_every_law_is_measured_everywhere() {
         // States up to a strain of 0.3 are inside every law's domain, and their values normal numbers.
         let small = found.cells.iter().filter(|c| c.strain <= 0.3);
         for cell in small {
-            assert_eq!(cell.states, OPTIONS.samples, "{}: {cell:?}", entry.info.name);
+            // A law's selections may be undecided at some.
+            let selects = entry.info.operations.iter().any(|o| o.kernel == "force_far" && o.selects > 0);
+            assert!(cell.states == OPTIONS.samples || selects, "{}: {cell:?}", entry.info.name);
         }
         assert_eq!(found, measured(&Subject::of_build(entry)), "{}", entry.info.name);
     }

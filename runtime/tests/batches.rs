@@ -2,7 +2,7 @@
 
 mod support;
 
-use support::{Random, body, outcome, parameters, parameters_text, scene, system};
+use support::{Random, body, outcome, parameters, scene, system, table};
 use tensormass_runtime::backend::{Backend, ForceField};
 use tensormass_runtime::laws;
 use tensormass_runtime::mesh::beam;
@@ -15,7 +15,11 @@ fn materials(slabs: &[(&str, f64)], length: f64, density: f64) -> String {
     let count = slabs.len() as f64;
     let one = |(i, (law, stiffness)): (usize, &(&str, f64))| {
         let entry = tensormass_runtime::law(law).expect("a law of this build");
-        let text = parameters_text(entry).replace("1000000.0", &format!("{stiffness:?}"));
+        // Moduli in units of 1 MPa, whatever their names and defaults are.
+        let mut values = parameters(entry);
+        let units = entry.info.parameters.iter().flat_map(|p| std::iter::repeat_n(p.dimensions[1], p.len));
+        values.iter_mut().zip(units).for_each(|(x, power)| *x *= (stiffness / 1e6).powi(power));
+        let text = table(entry, &values);
         let (from, to) = (length * i as f64 / count, length * (i + 1) as f64 / count);
         format!(
             "[[material]]\nlaw = \"{law}\"\ndensity = {density:?}\nelements = \"x > {from:?} && x < {to:?}\"\n\
@@ -42,7 +46,7 @@ const SWING: Swing = Swing {
     length: 1.0,
     stress: 1.0,
     origin: [0.0; 3],
-    cells: [8, 2, 2],
+    cells: [16, 2, 2],
     integrator: "implicit-euler",
     precision: "f64",
     threads: 1,

@@ -52,7 +52,7 @@ impl Session {
             leaves.jacobian = Some((j, p, trace, second.into()));
         }
         if let Some((second, trace, remainder, change)) = self.near_second()? {
-            let split = Split::given(Expr::int(3), change).to_second_order(trace, Expr::int(2), remainder);
+            let split = Split::given(Expr::int(3), change).with_second_order(trace, Expr::int(2), remainder);
             leaves.others.push((second, split));
         }
         let sums = self.strain.near_stretch_sums(&mut self.quantities);
@@ -60,7 +60,7 @@ impl Session {
             let trace = self.strain.invariant(&mut self.cas, &mut self.quantities, Invariant::Trace(Base::A))?;
             for s in sums {
                 let change = Split::given(Expr::int(3), s.change);
-                leaves.others.push((s.sum, change.to_second_order(trace, s.half, s.remainder)));
+                leaves.others.push((s.sum, change.with_second_order(trace, s.half, s.remainder)));
             }
         }
         for (invariant, s) in self.strain.invariants() {

@@ -97,7 +97,7 @@ impl Split {
     }
 
     /// With its change to second order: `coefficient` times a linear invariant, and the remainder.
-    pub fn to_second_order(self, invariant: Symbol, coefficient: Expr, remainder: Symbol) -> Self {
+    pub fn with_second_order(self, invariant: Symbol, coefficient: Expr, remainder: Symbol) -> Self {
         Self { second: Some(Second::known(invariant, coefficient, remainder)), ..self }
     }
 }
