@@ -58,8 +58,9 @@ fn slopes_at_rest_are_the_moduli() {
                 curve.iter().find(near).expect("a point there").nominal
             };
             let slope = (at(rest + h) - at(rest - h)) / (2.0 * h);
-            // Central differences are off by h^2 times a ratio of derivatives, and by the stress's rounding over h.
-            assert!((slope / wanted - 1.0).abs() < 1e-6, "{} {mode:?}: {slope} {wanted}", entry.info.name);
+            // Central differences are off by h^2 times a ratio of derivatives (150 for J^-9), and by the stress's rounding
+            // over h.
+            assert!((slope / wanted - 1.0).abs() < 1e-5, "{} {mode:?}: {slope} {wanted}", entry.info.name);
         }
     }
 }

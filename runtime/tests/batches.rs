@@ -4,22 +4,26 @@ mod support;
 
 use support::{Random, body, outcome, parameters, scene, system, table};
 use tensormass_runtime::backend::{Backend, ForceField};
-use tensormass_runtime::laws;
 use tensormass_runtime::mesh::beam;
 use tensormass_runtime::model::{Model, build};
 use tensormass_runtime::scene::Scene;
 use tensormass_runtime::simulate::Ending;
+use tensormass_runtime::{LawEntry, laws};
+
+/// A material of the law whose moduli, whatever their names and defaults are, are `stiffness` for 1 MPa.
+fn stiffened(law: &LawEntry, stiffness: f64) -> Vec<f64> {
+    let mut values = parameters(law);
+    let powers = law.info.parameters.iter().flat_map(|p| std::iter::repeat_n(p.dimensions[1], p.len));
+    values.iter_mut().zip(powers).for_each(|(x, power)| *x *= (stiffness / 1e6).powi(power));
+    values
+}
 
 /// Materials for slabs along x, by law and Young's modulus; other parameters are those of any law.
 fn materials(slabs: &[(&str, f64)], length: f64, density: f64) -> String {
     let count = slabs.len() as f64;
     let one = |(i, (law, stiffness)): (usize, &(&str, f64))| {
         let entry = tensormass_runtime::law(law).expect("a law of this build");
-        // Moduli in units of 1 MPa, whatever their names and defaults are.
-        let mut values = parameters(entry);
-        let units = entry.info.parameters.iter().flat_map(|p| std::iter::repeat_n(p.dimensions[1], p.len));
-        values.iter_mut().zip(units).for_each(|(x, power)| *x *= (stiffness / 1e6).powi(power));
-        let text = table(entry, &values);
+        let text = table(entry, &stiffened(entry, *stiffness));
         let (from, to) = (length * i as f64 / count, length * (i + 1) as f64 / count);
         format!(
             "[[material]]\nlaw = \"{law}\"\ndensity = {density:?}\nelements = \"x > {from:?} && x < {to:?}\"\n\
@@ -216,8 +220,7 @@ fn check_slabs(slabs: &[(&str, f64)]) {
         // The forces of this slab: a body of its elements' batch only.
         let entry = tensormass_runtime::law(slab.0).expect("a law");
         let mesh = beam([4.0, 1.0, 1.0], [8, 2, 2], [0.0; 3]).expect("a beam");
-        let mut own = parameters(entry);
-        own.iter_mut().filter(|p| **p == 1e6).for_each(|p| *p = slab.1);
+        let own = stiffened(entry, slab.1);
         let mut body = body(&mesh, entry, &own, &[]);
         let place = |e: &u32| {
             let corners = mesh.corners(tensormass_runtime::mesh::ElementId(*e));
