@@ -29,7 +29,7 @@ pub struct Arguments {
     /// Points of the curve; of a cycle, those of each of its four parts.
     #[arg(long, value_name = "N", default_value_t = 41)]
     points: u16,
-    /// A material parameter, an array's component as name[k]; may be given several times. The others are the law's
+    /// A material parameter, an array's component as `name[k]`; may be given several times. The others are the law's
     /// defaults, or the middle of their range.
     #[arg(long = "set", value_name = "PARAMETER=VALUE", value_parser = assignment, allow_hyphen_values = true)]
     set: Vec<(String, f64)>,
