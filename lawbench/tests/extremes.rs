@@ -37,11 +37,18 @@ fn lost_digits_are_found_and_kept_ones_pass() {
 }
 
 #[test]
-fn dforce_of_every_law_is_measured_everywhere() {
+fn every_law_is_measured_everywhere_and_keeps_its_digits() {
     for entry in laws() {
         let found = measured(&Subject::of_build(entry));
         assert_eq!(found.wgsl, Adapter::Skipped("not asked for".into()));
         assert_eq!(found.cells.len(), 2 * 3 * found.materials.len() * STRAINS.len() * ROTATIONS.len());
+        // A textbook form that cancels is off by 1e5 times the gate and more. What is left above it is a matter of single
+        // roundings, and `law extremes --all` shows it. Fibres and principal stretches have more to lose.
+        let text = &entry.source.law;
+        if !entry.info.structure.uses_fibres && !text.contains("stretch_sum") {
+            let worst = found.cells.iter().map(|c| c.gate).fold(0.0, f64::max);
+            assert!(worst <= 2.0, "{}: {worst} times the gate; {:?}", entry.info.name, found.failures());
+        }
         // States up to a strain of 0.3 are inside every law's domain, and their values normal numbers.
         let small = found.cells.iter().filter(|c| c.strain <= 0.3);
         for cell in small {
