@@ -123,11 +123,7 @@ impl Reference {
         let here = tangent(derivation, constants, &g);
         // A one-sided difference: its error is a part in 1e40 of the next derivative.
         let step = Exact::power_of_ten(-40);
-        let ahead = std::array::from_fn(|k| d[k].fma(&step, &g[k]));
-        let ahead = tangent(derivation, constants, &ahead);
-        let difference: Vec<Exact> =
-            ahead.as_flattened().iter().zip(here.as_flattened()).map(|(a, b)| a.sub(b)).collect();
-        let curvature = Exact::norm(&difference).div(&step);
+        let curvature = tangent_change(derivation, constants, &here, (&g, &d), &step).div(&step);
         let differential: Vec<Exact> =
             (0..9).map(|i| (0..9).fold(Exact::zero(), |sum, k| here[k][i].fma(&d[k], &sum))).collect();
 
@@ -209,14 +205,23 @@ fn jumps(
     let explained = curvature.mul(&Exact::from(4.0 * radius));
     let rounding = Exact::norm(here.as_flattened()).mul(&Exact::from(8.0 * epsilon));
     let bound = explained.add(&rounding);
-    [radius, -radius].iter().any(|step| {
-        let step = Exact::from(*step);
-        let there = std::array::from_fn(|k| Exact::from(direction[k]).fma(&step, &Exact::from(gradient[k])));
-        let there = tangent(derivation, constants, &there);
-        let difference: Vec<Exact> =
-            there.as_flattened().iter().zip(here.as_flattened()).map(|(a, b)| a.sub(b)).collect();
-        Exact::norm(&difference).greater(&bound)
-    })
+    let (g, d) = (gradient.map(Exact::from), direction.map(Exact::from));
+    [radius, -radius]
+        .iter()
+        .any(|step| tangent_change(derivation, constants, here, (&g, &d), &Exact::from(*step)).greater(&bound))
+}
+
+/// |dP/dG at G + step D - dP/dG at G|, where `here` is the latter.
+fn tangent_change(
+    derivation: &Derivation,
+    constants: &[Exact],
+    here: &[[Exact; 9]; 9],
+    (g, d): (&[Exact; 9], &[Exact; 9]),
+    step: &Exact,
+) -> Exact {
+    let there = tangent(derivation, constants, &std::array::from_fn(|k| d[k].fma(step, &g[k])));
+    let change: Vec<Exact> = there.as_flattened().iter().zip(here.as_flattened()).map(|(a, b)| a.sub(b)).collect();
+    Exact::norm(&change)
 }
 
 #[cfg(test)]
