@@ -91,9 +91,9 @@ fn check(term: &str, uses_j: bool, value: impl Fn(&State) -> f64) {
     assert!(structure.uses_fibres && !structure.isotropic && !structure.linear, "{term}: {structure:?}");
     assert_eq!((structure.uses_j, structure.polynomial), (uses_j, !uses_j), "{term}");
     let parameters = [&[MU][..], &A, &B].concat();
-    let constants = derivation.kernel("material").interpret(&[(Input::Parameters, &parameters)]).expect("parameters");
+    let constants = derivation.material(&parameters).expect("parameters");
     let run = |kernel: &str, g: &[f64; 9], more: &[(Input, &[f64])]| {
-        let mut inputs = vec![(Input::Constants, constants[0].as_slice()), (Input::DisplacementGradient, g)];
+        let mut inputs = vec![(Input::Constants, constants.as_slice()), (Input::DisplacementGradient, g)];
         inputs.extend_from_slice(more);
         derivation.point(kernel).interpret(&inputs).expect("the inputs of a point kernel").swap_remove(0)
     };

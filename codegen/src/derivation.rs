@@ -1,6 +1,7 @@
 //! The derivation of one law: its kernels, validated, and the text form that `laws/derived/` commits.
 
 use crate::ir::{Input, InterpretError, InvalidKernel, IrTextError, KernelIr, Number, Output, ValidKernel, ValueId};
+use crate::twofold::Twofold;
 
 /// The version of the derivation's text form.
 const FORMAT: &str = "tensormass derivation 2";
@@ -111,6 +112,16 @@ impl Derivation {
     /// The kernel of this name.
     pub fn kernel(&self, name: &str) -> &ValidKernel {
         self.kernels.iter().find(|k| k.ir().name == name).expect("one of KERNELS")
+    }
+
+    /// The constants of a material as printed code computes them: in twofold precision, each rounded once to f64.
+    ///
+    /// # Errors
+    /// There is not one value for each component of each parameter.
+    pub fn material(&self, parameters: &[f64]) -> Result<Vec<f64>, InterpretError> {
+        let parameters: Vec<Twofold> = parameters.iter().map(|&x| x.into()).collect();
+        let constants = self.kernel("material").interpret(&[(Input::Parameters, parameters.as_slice())])?;
+        Ok(constants[0].iter().map(|c| c.to_f64()).collect())
     }
 
     /// A kernel at a material point, with its form for far from rest.

@@ -87,7 +87,7 @@ pub fn build(laws: &str) {
     }
 }
 
-/// Generates `kernels.rs`, what the kernels crate shares with this one (`remainder.rs`), the fresh derivations (`derived/NAME.ir`) and the law files as plain Rust
+/// Generates `kernels.rs`, what the kernels crate shares with this one (`remainder.rs`, `twofold.rs`), the fresh derivations (`derived/NAME.ir`) and the law files as plain Rust
 /// (`oracle/NAME.rs`, and `oracle/all.rs` with a module and a table entry for each; see [`crate::oracle`]).
 ///
 /// # Errors
@@ -127,8 +127,10 @@ fn generate_from(laws: &Path, out: &Path, derive: bool) -> Result<Vec<GeneratedL
     }
     let kernels = out.join("kernels.rs");
     std::fs::write(&kernels, print(&generated)?).map_err(io(&kernels))?;
-    let remainder = out.join("remainder.rs");
-    std::fs::write(&remainder, include_str!("remainder.rs")).map_err(io(&remainder))?;
+    for (name, text) in [("remainder.rs", include_str!("remainder.rs")), ("twofold.rs", include_str!("twofold.rs"))] {
+        let path = out.join(name);
+        std::fs::write(&path, text).map_err(io(&path))?;
+    }
     let oracle = out.join("oracle");
     std::fs::create_dir_all(&oracle).map_err(io(&oracle))?;
     let write = |file: &str, text: String| {

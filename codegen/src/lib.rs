@@ -33,6 +33,7 @@ mod remainder;
 #[cfg(feature = "derive")]
 mod split;
 pub mod structure;
+mod twofold;
 pub mod worker;
 
 pub use generate::build;

@@ -11,7 +11,7 @@ use crate::shader::LawShaders;
 pub trait Law: Send + Sync + 'static {
     /// What the law is.
     fn info() -> &'static LawInfo;
-    /// The constants of a material from its parameters (all components in order), on the host in f64.
+    /// The constants of a material from its parameters (all components in order), on the host, each rounded once.
     ///
     /// # Panics
     /// If the slices have not the lengths that [`LawInfo`] gives.

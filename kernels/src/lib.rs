@@ -14,6 +14,9 @@ pub mod shader;
 
 pub use law::{BatchKernels, Law, LawEntry, LawInfo, LawSource, Operations, ParameterInfo, Structure};
 pub use real::Real;
+// Generated text computes constants in it.
+#[doc(hidden)]
+pub use real::twofold::Twofold;
 
 /// The kernels printed by the generator for this build.
 // Generated text: its generator is tested instead.

@@ -4,6 +4,8 @@ use remainder::Remainder;
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+use twofold::Twofold;
+
 /// A real number, or several side by side, as generated kernels use it.
 ///
 /// Generated code calls nothing else, so that a type of lanes or of dual numbers can stand in for `f32` and `f64`.
@@ -50,6 +52,12 @@ pub trait Real:
 /// The text that the interpreter of kernels uses too: the same operations, bit for bit.
 mod remainder {
     include!(concat!(env!("OUT_DIR"), "/remainder.rs"));
+}
+
+/// Likewise, for the constants of materials.
+#[doc(hidden)]
+pub mod twofold {
+    include!(concat!(env!("OUT_DIR"), "/twofold.rs"));
 }
 
 macro_rules! float {
@@ -112,3 +120,46 @@ macro_rules! float {
 }
 float!(f32);
 float!(f64);
+
+/// Constants of materials are computed in it.
+impl Real for Twofold {
+    fn from_f64(x: f64) -> Self {
+        x.into()
+    }
+    fn to_f64(self) -> f64 {
+        Twofold::to_f64(self)
+    }
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        self * b + c
+    }
+    fn sqrt(self) -> Self {
+        Twofold::sqrt(self)
+    }
+    fn ln(self) -> Self {
+        Twofold::ln(self)
+    }
+    fn exp(self) -> Self {
+        Twofold::exp(self)
+    }
+    fn ln_1p(self) -> Self {
+        (Self::from(1.0) + self).ln()
+    }
+    fn exp_m1(self) -> Self {
+        self.exp() - Self::from(1.0)
+    }
+    fn log1pmx(self) -> Self {
+        self - self.ln_1p()
+    }
+    fn expm1mx(self) -> Self {
+        self.exp_m1() - self
+    }
+    fn powf(self, y: Self) -> Self {
+        Twofold::powf(self, y)
+    }
+    fn select_greater(left: Self, right: Self, then: Self, otherwise: Self) -> Self {
+        if left > right { then } else { otherwise }
+    }
+    fn is_positive(self) -> bool {
+        Twofold::to_f64(self) > 0.0
+    }
+}

@@ -33,7 +33,7 @@ pub struct Moduli {
 impl Moduli {
     /// From the tangent at rest, interpreted in f64.
     pub fn at_rest(derivation: &Derivation, parameters: &[f64]) -> Self {
-        let constants = constants(derivation, parameters);
+        let constants = derivation.material(parameters).expect("one value a component");
         // D : C : D for a symmetric direction D.
         let stiffness = |d: &[f64; 9]| {
             let inputs = [
@@ -217,9 +217,9 @@ impl Material {
         constants(derivation, &self.parameters.iter().copied().map(Exact::from).collect::<Vec<_>>())
     }
 
-    /// The constants as a program computes them: on the host in f64.
+    /// The constants as a program computes them.
     pub fn constants(&self, derivation: &Derivation) -> Vec<f64> {
-        constants(derivation, &self.parameters)
+        derivation.material(&self.parameters).expect("one value a component")
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::{Input, Op, Rational, ValidKernel};
 use crate::remainder;
+use crate::twofold::Twofold;
 
 /// A number type in which a kernel can be interpreted.
 pub trait Number: Clone {
@@ -97,6 +98,59 @@ macro_rules! float_number {
 }
 float_number!(f32);
 float_number!(f64);
+
+/// The type of the kernel `material`, as printed code computes it.
+impl Number for Twofold {
+    fn from_rational(q: Rational) -> Self {
+        let (numerator, denominator) = (*q.numer() as f64, *q.denom() as f64);
+        if q.is_integer() { numerator.into() } else { Self::from(numerator) / Self::from(denominator) }
+    }
+    fn add(&self, b: &Self) -> Self {
+        *self + *b
+    }
+    fn sub(&self, b: &Self) -> Self {
+        *self - *b
+    }
+    fn mul(&self, b: &Self) -> Self {
+        *self * *b
+    }
+    fn div(&self, b: &Self) -> Self {
+        *self / *b
+    }
+    fn neg(&self) -> Self {
+        -*self
+    }
+    fn fma(&self, b: &Self, c: &Self) -> Self {
+        *self * *b + *c
+    }
+    fn sqrt(&self) -> Self {
+        Twofold::sqrt(*self)
+    }
+    fn ln(&self) -> Self {
+        Twofold::ln(*self)
+    }
+    fn exp(&self) -> Self {
+        Twofold::exp(*self)
+    }
+    fn log1p(&self) -> Self {
+        Twofold::ln(Self::from(1.0) + *self)
+    }
+    fn expm1(&self) -> Self {
+        Twofold::exp(*self) - Self::from(1.0)
+    }
+    fn log1pmx(&self) -> Self {
+        *self - self.log1p()
+    }
+    fn expm1mx(&self) -> Self {
+        self.expm1() - *self
+    }
+    fn powf(&self, b: &Self) -> Self {
+        Twofold::powf(*self, *b)
+    }
+    fn greater(&self, b: &Self) -> bool {
+        self > b
+    }
+}
 
 /// The caller's inputs do not fit the kernel.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

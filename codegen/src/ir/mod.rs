@@ -36,6 +36,7 @@ mod text;
 mod validate;
 
 pub use crate::remainder::Remainder;
+pub use crate::twofold::Twofold;
 pub use build::Builder;
 pub use count::OperationCount;
 pub use interpret::{InterpretError, Number};

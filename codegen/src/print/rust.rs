@@ -175,12 +175,15 @@ fn material(kernel: &ValidKernel) -> TokenStream {
     let lets = statements(kernel, &names, true);
     let stores = kernel.ir().outputs[0].1.iter().enumerate().map(|(k, v)| {
         let (k, value) = (plain(k), &names[v.index()]);
-        quote!(constants[#k] = #value;)
+        quote!(constants[#k] = R::to_f64(#value);)
     });
     quote! {
         fn material(parameters: &[f64], constants: &mut [f64]) {
             let parameters: &[f64; #length] = parameters.try_into().expect("one value for each component of each parameter");
             let constants: &mut [f64; #count] = constants.try_into().expect("room for each constant");
+            // Twice the digits: what cancels here would be lost to every kernel. Each constant is rounded once.
+            type R = ::tensormass_kernels::Twofold;
+            let parameters = parameters.map(R::from_f64);
             #(#lets)*
             #(#stores)*
         }
@@ -330,20 +333,20 @@ fn statements(kernel: &ValidKernel, names: &[TokenStream], host: bool) -> Vec<To
     let at = |v: ValueId| &names[v.index()];
     let call = |method: &str, v: &[ValueId]| {
         let method = Ident::new(method, Span::call_site());
-        let values: Vec<_> = v.iter().map(|v| at(*v)).collect();
-        if host {
-            quote!(<f64 as ::tensormass_kernels::Real>::#method(#(#values),*))
-        } else {
-            quote!(R::#method(#(#values),*))
-        }
+        let values = v.iter().map(|v| at(*v));
+        if host { quote!(<R as Real>::#method(#(#values),*)) } else { quote!(R::#method(#(#values),*)) }
     };
     let mut lets = Vec::new();
     for (i, d) in kernel.ir().values.iter().enumerate() {
         let value = match d.op {
             Op::Input(..) => continue,
+            Op::Const(q) if host && !q.is_integer() => {
+                let [n, d] = [q.numer(), q.denom()].map(|x| float(Rational::from_integer(*x)));
+                quote!(R::from_f64(#n) / R::from_f64(#d))
+            }
             Op::Const(q) => {
                 let q = float(q);
-                if host { quote!(#q) } else { quote!(R::from_f64(#q)) }
+                quote!(R::from_f64(#q))
             }
             Op::Add(a, b) => binary(at(a), quote!(+), at(b)),
             Op::Sub(a, b) => binary(at(a), quote!(-), at(b)),
