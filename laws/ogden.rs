@@ -1,8 +1,9 @@
 //! Ogden solid of three terms in the modified principal stretches lambdabar_i = J^(-1/3) lambda_i:
 //! W = sum_p mu_p/alpha_p (lambdabar_1^alpha_p + lambdabar_2^alpha_p + lambdabar_3^alpha_p - 3)
-//!   + kappa/beta^2 (beta ln J + J^(-beta) - 1).
-//! Ogden, Proc. R. Soc. Lond. A 326, 565-584, 1972 (defaults: its fit to Treloar's vulcanised rubber), and the volumetric
-//! part of Ogden, Proc. R. Soc. Lond. A 328, 567-583, 1972; Holzapfel, Nonlinear Solid Mechanics, 2000, section 6.5.
+//!   + kappa/4 (J^2 - 1 - 2 ln J).
+//! Ogden, Proc. R. Soc. Lond. A 326, 565-584, 1972 (defaults: its fit to Treloar's vulcanised rubber); the volumetric part is
+//! that of Ogden, Proc. R. Soc. Lond. A 328, 567-583, 1972, with beta = -2 (Simo & Miehe 1992; Holzapfel, Nonlinear Solid
+//! Mechanics, 2000, section 6.5): its beta = 9 for rubber passes the range of single precision in strong compression.
 //!
 //! The shear modulus at rest is half the sum of mu_p alpha_p. Terms with a positive and with a negative exponent are
 //! parameters apart, so that the range of neither holds 0, where mu/alpha is infinite. A term with mu = 0 is left out.
@@ -18,8 +19,6 @@ struct Parameters {
     #[unit("1")] #[range(-30.0, -0.1)] #[default(-2.0)] alpha_negative: f64,
     /// Bulk modulus at rest.
     #[unit("Pa")] #[range(1e0, 1e12)] kappa: f64,
-    /// Exponent of the volumetric part.
-    #[unit("1")] #[range(0.5, 30.0)] #[default(9.0)] beta: f64,
 }
 fn term(s: Strain, mu: f64, alpha: f64) -> f64 {
     mu / alpha * (s.J.powf(-alpha / 3.0) * s.stretch_sum(alpha) - 3.0)
@@ -28,5 +27,5 @@ fn energy_density_isochoric(s: Strain, p: Parameters) -> f64 {
     sum(0..2, |i| term(s, p.mu[i], p.alpha[i])) + term(s, p.mu_negative, p.alpha_negative)
 }
 fn energy_density_volumetric(s: Strain, p: Parameters) -> f64 {
-    p.kappa / p.beta.powi(2) * (p.beta * ln(s.J) + s.J.powf(-p.beta) - 1.0)
+    p.kappa / 4.0 * (s.J.powi(2) - 1.0 - 2.0 * ln(s.J))
 }

@@ -73,6 +73,13 @@ impl Quantities {
         self.add(name, Kind::Stage { value: Value::Expr(e), partials: None })
     }
 
+    /// Gives a stage partial derivatives of its own, which may read the stage itself.
+    pub fn differentiate_by(&mut self, s: Symbol, by: Vec<(Symbol, Expr)>) {
+        if let Kind::Stage { partials, .. } = &mut self.0[s.0 as usize].kind {
+            *partials = Some(by);
+        }
+    }
+
     /// The stages that are selections, with names and values.
     pub fn selections(&self) -> Vec<(Symbol, String, Value)> {
         let each = self.0.iter().enumerate().filter_map(|(i, q)| match &q.kind {
@@ -97,6 +104,19 @@ impl Quantities {
     /// Whether the expression depends on the parameters alone.
     pub fn is_constant_expr(&self, e: &Expr) -> bool {
         e.symbols().into_iter().all(|s| self.is_constant(s))
+    }
+
+    /// Whether the expression is a polynomial in what is no constant.
+    pub fn is_polynomial(&self, e: &Expr) -> bool {
+        match e {
+            Expr::Symbol(_) => true,
+            Expr::Sum(parts) | Expr::Product(parts) => parts.iter().all(|part| self.is_polynomial(part)),
+            Expr::Power(base, exponent) => {
+                let whole = matches!(&**exponent, Expr::Number(q) if q.is_integer() && *q.numer() > 0);
+                (whole && self.is_polynomial(base)) || self.is_constant_expr(e)
+            }
+            _ => self.is_constant_expr(e),
+        }
     }
 
     /// Whether the expression is constant or a constant times one symbol.

@@ -150,7 +150,7 @@ fn identities(subject: &Subject, materials: &[Material], seed: u64) -> Vec<Findi
                 let kind = if law.selects() { 0 } else { s + k };
                 let gradient = random.gradient(*strain, ROTATIONS[*r], kind);
                 let g = exact(&gradient);
-                if law.inside(&g) && !law.is_undecided(&gradient, &random.direction()) {
+                if law.inside(&g) && !law.is_undecided(&g) {
                     states.push(At::new(law, g, &mut random));
                 }
             }

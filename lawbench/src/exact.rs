@@ -4,10 +4,10 @@ use tensormass_codegen::derivation::Derivation;
 use tensormass_codegen::ir::{Input, Number};
 
 use crate::evaluate::{printed, textbook};
-use crate::gate::{is_undecided, selects};
 use crate::lanes::tangent;
 use crate::material::Material;
 use crate::number::Exact;
+use crate::undecided::Selections;
 
 /// 3 by 3, row by row.
 pub type Matrix = [Exact; 9];
@@ -25,12 +25,15 @@ impl<'a> ExactLaw<'a> {
 
     /// Whether the law has selections.
     pub fn selects(&self) -> bool {
-        selects(self.derivation)
+        Selections::new(self.derivation).exist()
     }
 
-    /// Whether a selection of the law is not decided by G.
-    pub fn is_undecided(&self, gradient: &[f64; 9], direction: &[f64; 9]) -> bool {
-        is_undecided(self.derivation, &self.constants, gradient, direction)
+    /// Whether a selection of the law is not decided by G in double precision.
+    pub fn is_undecided(&self, gradient: &Matrix) -> bool {
+        let here = tangent(self.derivation, &self.constants, gradient);
+        let [undecided] =
+            Selections::new(self.derivation).are_undecided(&self.constants, gradient, &here, [f64::EPSILON]);
+        undecided
     }
 
     fn values(&self, kernel: &str, g: &Matrix, more: &[(Input, &[Exact])]) -> Vec<Exact> {

@@ -14,11 +14,12 @@
 //! selection of the law is not decided by the input, nothing is promised.
 
 use tensormass_codegen::derivation::Derivation;
-use tensormass_codegen::ir::{Input, Number, Op};
+use tensormass_codegen::ir::{Input, Number};
 
 use crate::evaluate::textbook;
 use crate::lanes::tangent;
 use crate::number::Exact;
+use crate::undecided::Selections;
 
 /// What computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
@@ -98,8 +99,8 @@ pub struct Reference {
     second: Exact,
     /// |dP/dG| |G| / |P|.
     pub condition: f64,
-    /// Whether the tangent jumps within the rounding of G in single and in double precision.
-    jumps: [bool; 2],
+    /// Whether a selection is not decided by G in single and in double precision.
+    undecided: [bool; 2],
 }
 
 impl Reference {
@@ -127,6 +128,8 @@ impl Reference {
         let differential: Vec<Exact> =
             (0..9).map(|i| (0..9).fold(Exact::zero(), |sum, k| here[k][i].fma(&d[k], &sum))).collect();
 
+        let selections = Selections::new(derivation);
+        let undecided = selections.are_undecided(constants, &g, &here, [f32::EPSILON.into(), f64::EPSILON]);
         let [g, d, p] = [&g[..], &d[..], &force.value].map(Exact::norm);
         let stiffness = Exact::norm(here.as_flattened());
         let pull = stiffness.mul(&g);
@@ -134,11 +137,8 @@ impl Reference {
         let second = pull.mul(&g).mul(&Exact::from(0.5));
         let condition = pull.div(&p).to_f64();
         let values = [force.value, vec![energy], differential];
-        let jumps = [f32::EPSILON.into(), f64::EPSILON].map(|epsilon: f64| {
-            selects(derivation) && jumps(derivation, constants, &here, (gradient, direction), epsilon, &curvature)
-        });
         let finite = values.iter().flatten().chain(&first).all(Exact::is_finite);
-        finite.then_some(Self { values, first, second, condition, jumps })
+        finite.then_some(Self { values, first, second, condition, undecided })
     }
 
     /// The exact value.
@@ -148,7 +148,7 @@ impl Reference {
 
     /// How far a machine's value is off; none where the gate makes no promise.
     pub fn measure(&self, machine: Machine, quantity: Quantity, computed: &[f64]) -> Option<Measure> {
-        if self.jumps[usize::from(machine == Machine::F64)] {
+        if self.undecided[usize::from(machine == Machine::F64)] {
             return None;
         }
         let (round_off, least, greatest) = machine.numbers();
@@ -172,43 +172,6 @@ impl Reference {
         let error = Exact::norm(&error);
         Some(Measure { gate: error.div(&bound).to_f64(), relative: error.div(&size).to_f64() })
     }
-}
-
-/// Whether a selection of the law is not decided by G in double precision, so that the tangent has no one value there.
-pub fn is_undecided(derivation: &Derivation, constants: &[Exact], gradient: &[f64; 9], direction: &[f64; 9]) -> bool {
-    if !selects(derivation) {
-        return false;
-    }
-    let here = tangent(derivation, constants, &gradient.map(Exact::from));
-    // Without the curvature's part: a state too many is left out rather than one too few.
-    jumps(derivation, constants, &here, (gradient, direction), f64::EPSILON, &Exact::zero())
-}
-
-/// Whether the law has selections.
-pub fn selects(derivation: &Derivation) -> bool {
-    let force = derivation.point("force");
-    force.textbook().ir().values.iter().any(|d| matches!(d.op, Op::Select(..)))
-}
-
-/// Whether the tangent at eight roundings from G, in either sense of the direction, is another one than its derivative
-/// says, by more than rounding.
-fn jumps(
-    derivation: &Derivation,
-    constants: &[Exact],
-    here: &[[Exact; 9]; 9],
-    (gradient, direction): (&[f64; 9], &[f64; 9]),
-    epsilon: f64,
-    curvature: &Exact,
-) -> bool {
-    let norm = |x: &[f64; 9]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let radius = 8.0 * epsilon * norm(gradient) / norm(direction);
-    let explained = curvature.mul(&Exact::from(4.0 * radius));
-    let rounding = Exact::norm(here.as_flattened()).mul(&Exact::from(8.0 * epsilon));
-    let bound = explained.add(&rounding);
-    let (g, d) = (gradient.map(Exact::from), direction.map(Exact::from));
-    [radius, -radius]
-        .iter()
-        .any(|step| tangent_change(derivation, constants, here, (&g, &d), &Exact::from(*step)).greater(&bound))
 }
 
 /// |dP/dG at G + step D - dP/dG at G|, where `here` is the latter.
@@ -249,7 +212,7 @@ mod tests {
                     let exact: Vec<f64> = reference.value(quantity).iter().map(Exact::to_f64).collect();
                     let rounded: Vec<f64> = exact.iter().map(|x| f64::from(*x as f32)).collect();
                     let gate = |values: &[f64]| reference.measure(Machine::F32, quantity, values).expect("normal").gate;
-                    if reference.jumps[0] {
+                    if reference.undecided[0] {
                         continue;
                     }
                     assert!(gate(&rounded) <= 1.0, "{} {quantity:?}", entry.info.name);

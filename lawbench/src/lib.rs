@@ -27,4 +27,5 @@ pub mod states;
 pub mod subject;
 mod svg;
 pub mod table;
+pub mod undecided;
 pub mod wgsl;

@@ -15,6 +15,8 @@ pub struct Differential<'a> {
     seeds: BTreeMap<Symbol, Expr>,
     /// Quantities that are independent here: their differential is their seed or 0.
     stop: Vec<Symbol>,
+    /// Quantities that differ from others by constants: their differential is the other's.
+    same: BTreeMap<Symbol, Symbol>,
     known: HashMap<Symbol, Expr>,
 }
 
@@ -27,7 +29,12 @@ impl<'a> Differential<'a> {
         seeds: BTreeMap<Symbol, Expr>,
         stop: Vec<Symbol>,
     ) -> Self {
-        Self { cas, quantities, prefix, seeds, stop, known: HashMap::new() }
+        Self { cas, quantities, prefix, seeds, stop, same: BTreeMap::new(), known: HashMap::new() }
+    }
+
+    /// Gives each first quantity the differential of its second.
+    pub fn with_same(self, same: BTreeMap<Symbol, Symbol>) -> Self {
+        Self { same, ..self }
     }
 
     /// The differential of an expression.
@@ -49,6 +56,9 @@ impl<'a> Differential<'a> {
         }
         if let Some(known) = self.known.get(&s) {
             return Ok(known.clone());
+        }
+        if let Some(&other) = self.same.get(&s) {
+            return self.symbol(other);
         }
         let quantity = self.quantities.get(s).clone();
         let d = match quantity.kind {

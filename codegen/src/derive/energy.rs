@@ -34,6 +34,8 @@ pub struct Energy<'a> {
     known: HashMap<*const ScalarNode, Expr>,
     /// The comparisons of the law's selections.
     pub conditions: Vec<(Expr, Expr)>,
+    /// Whether a broken power of J multiplies what depends on the strain.
+    pub isochoric: bool,
     /// The tensor in which finite strains are expressed.
     finite: Base,
 }
@@ -52,7 +54,8 @@ impl<'a> Energy<'a> {
             }
             parameters.push(components);
         }
-        Self { cas, quantities, strain, parameters, known: HashMap::new(), conditions: vec![], finite: Base::A }
+        let (known, finite) = (HashMap::new(), Base::A);
+        Self { cas, quantities, strain, parameters, known, conditions: vec![], isochoric: false, finite }
     }
 
     /// The declared ranges, by the parameters' symbols.
@@ -98,7 +101,10 @@ impl<'a> Energy<'a> {
             }
             ScalarNode::Add(a, b) => self.scalar(a)? + self.scalar(b)?,
             ScalarNode::Sub(a, b) => self.scalar(a)? - self.scalar(b)?,
-            ScalarNode::Mul(a, b) => self.scalar(a)? * self.scalar(b)?,
+            ScalarNode::Mul(a, b) => {
+                let (a, b) = (self.scalar(a)?, self.scalar(b)?);
+                self.product(a, b)?
+            }
             ScalarNode::Div(a, b) => self.scalar(a)? / self.scalar(b)?,
             ScalarNode::Neg(a) => Expr::int(-1) * self.scalar(a)?,
             ScalarNode::Powi(a, n) => self.scalar(a)?.pow(one((*n).into())),
@@ -146,6 +152,52 @@ impl<'a> Energy<'a> {
         Ok(self.strain.invariant(self.cas, self.quantities, invariant)?.into())
     }
 
+    /// J^r times an invariant.
+    fn isochoric(&mut self, r: Rational, i: ast::Invariant) -> Result<Expr, DeriveError> {
+        let power = self.basic(Invariant::J)?.pow(r);
+        let invariant = self.invariant(i)?;
+        self.product(power, invariant)
+    }
+
+    /// a b. A broken power of J times what depends on the strain is a stage x = J^r b with dx = J^r db + r x dJ / J:
+    /// its two parts nearly cancel in every isochoric change, once, instead of in each second derivative by J.
+    fn product(&mut self, a: Expr, b: Expr) -> Result<Expr, DeriveError> {
+        let broken_power = |e: &Expr| match e {
+            Expr::Power(base, exponent) => match (&**base, &**exponent) {
+                (Expr::Symbol(_), Expr::Number(r)) if r.is_integer() => None,
+                (Expr::Symbol(j), exponent) => Some((*j, exponent.clone())),
+                _ => None,
+            },
+            _ => None,
+        };
+        let j = self.strain.jacobian_in_use();
+        let (power, r, other) = match (broken_power(&a), broken_power(&b)) {
+            (Some((s, r)), _) if Some(s) == j => (a.clone(), r, b.clone()),
+            (_, Some((s, r))) if Some(s) == j => (b.clone(), r, a.clone()),
+            _ => return Ok(a * b),
+        };
+        let varying: Vec<Symbol> = other.symbols().into_iter().filter(|s| !self.quantities.is_constant(*s)).collect();
+        if varying.is_empty() || j.is_some_and(|j| varying.contains(&j)) {
+            return Ok(a * b);
+        }
+        let name = match &other {
+            Expr::Symbol(s) => format!("{}bar", self.quantities.get(*s).name),
+            _ => "isochoric".into(),
+        };
+        let value = self.cas.normalize(&(power.clone() * other.clone()))?;
+        let stage = self.quantities.stage(name, value);
+        let mut partials = vec![];
+        for s in varying {
+            let partial = self.cas.derivative(&other, s)?;
+            partials.push((s, self.cas.normalize(&(power.clone() * partial))?));
+        }
+        let j = j.expect("a power of it was found");
+        partials.push((j, r * stage.into() * Expr::from(j).pow(Rational::from_integer(-1))));
+        self.quantities.differentiate_by(stage, partials);
+        self.isochoric = true;
+        Ok(stage.into())
+    }
+
     /// The components of a direction, by its parameter.
     fn direction(&self, parameter: usize) -> Direction {
         std::array::from_fn(|k| self.parameters[parameter][k])
@@ -159,12 +211,8 @@ impl<'a> Energy<'a> {
             ast::Invariant::I2 => self.basic(Invariant::Second)?,
             ast::Invariant::I3 => self.basic(Invariant::J)?.pow(two),
             ast::Invariant::J => self.basic(Invariant::J)?,
-            ast::Invariant::I1bar => {
-                self.basic(Invariant::J)?.pow(Rational::new(-2, 3)) * self.invariant(ast::Invariant::I1)?
-            }
-            ast::Invariant::I2bar => {
-                self.basic(Invariant::J)?.pow(Rational::new(-4, 3)) * self.invariant(ast::Invariant::I2)?
-            }
+            ast::Invariant::I1bar => self.isochoric(Rational::new(-2, 3), ast::Invariant::I1)?,
+            ast::Invariant::I2bar => self.isochoric(Rational::new(-4, 3), ast::Invariant::I2)?,
             ast::Invariant::I4(a) => Expr::int(1) + self.basic(Invariant::Fibre(self.direction(a)))?,
             ast::Invariant::I5(a) => {
                 let a = self.direction(a);
@@ -177,12 +225,8 @@ impl<'a> Energy<'a> {
                 let cosine = self.quantity("cosine", Value::Expr(cosine));
                 cosine + self.basic(Invariant::FibrePair(a, b))?
             }
-            ast::Invariant::I4bar(a) => {
-                self.basic(Invariant::J)?.pow(Rational::new(-2, 3)) * self.invariant(ast::Invariant::I4(a))?
-            }
-            ast::Invariant::I5bar(a) => {
-                self.basic(Invariant::J)?.pow(Rational::new(-4, 3)) * self.invariant(ast::Invariant::I5(a))?
-            }
+            ast::Invariant::I4bar(a) => self.isochoric(Rational::new(-2, 3), ast::Invariant::I4(a))?,
+            ast::Invariant::I5bar(a) => self.isochoric(Rational::new(-4, 3), ast::Invariant::I5(a))?,
         })
     }
 

@@ -64,6 +64,8 @@ struct Session {
     far_energy: Expr,
     /// The comparisons of the law's selections.
     conditions: Vec<(Expr, Expr)>,
+    /// Whether a broken power of J multiplies what depends on the strain.
+    isochoric: bool,
 }
 
 impl Session {
@@ -82,6 +84,7 @@ impl Session {
         };
         let ranges = reader.ranges(law);
         let conditions = std::mem::take(&mut reader.conditions);
+        let isochoric = reader.isochoric;
         reader.far_from_rest();
         let far_energy = reader.scalar(&law.energy)?;
         let far_energy = cas.normalize(&far_energy)?;
@@ -97,6 +100,7 @@ impl Session {
             rest: Rest::new(ranges),
             far_energy,
             conditions,
+            isochoric,
         })
     }
 
@@ -111,8 +115,10 @@ impl Session {
         let cauchy = self.cauchy(&stress);
         let (near_energy, at_rest) = self.near_energy()?;
         let near_stress = self.near_stress(&stress)?;
+        let far_energy = self.far_energy.clone();
+        let far_energy = if near_energy.is_some() { self.split_at_unit_volume(far_energy) } else { far_energy };
         let from_rest = |e: Expr| if at_rest.is_zero() { e } else { e - at_rest.clone() };
-        let (energy, far_energy) = (from_rest(energy), from_rest(self.far_energy.clone()));
+        let (energy, far_energy) = (from_rest(energy), from_rest(far_energy));
 
         use Input::{DisplacementGradient as G, GradientIncrement, NodeGradient};
         let mut point = Vec::new();
@@ -144,9 +150,22 @@ impl Session {
             }
             None => point.push(self.lower("force", &[G], with_margin(Output::Stress, stress.to_vec(), &margin))),
         }
+        let near_increment = match &near_stress {
+            Some(near) if self.isochoric => Some((self.near_increment(near, &dgradient)?, near.holds.clone())),
+            _ => None,
+        };
+        // Of every selection that the tangents have made.
         let accurate = self.accurate()?;
         let outputs = vec![(Output::StressIncrement, increment)];
-        point.push(self.lower_with("dforce", &[G, GradientIncrement], outputs, &accurate));
+        match near_increment {
+            Some(((increment, split), holds)) => {
+                let near = vec![(Output::StressIncrement, increment), (Output::NearRest, vec![holds])];
+                let instead = [accurate.as_slice(), &split].concat();
+                point.push(self.lower_with("dforce", &[G, GradientIncrement], near, &instead));
+                point.push(self.lower("dforce_far", &[G, GradientIncrement], outputs));
+            }
+            None => point.push(self.lower_with("dforce", &[G, GradientIncrement], outputs, &accurate)),
+        }
         point.push(self.lower_with("diagonal", &[G, NodeGradient], vec![(Output::Diagonal, diagonal)], &accurate));
         match near_stress {
             Some(near) => {

@@ -1,9 +1,12 @@
 //! What kernels compute near rest: the energy split over the Green strain, the stress split over G.
 
+use std::collections::BTreeMap;
+
 use crate::expr::{Expr, Symbol};
 use crate::quantity::{Kind, Value};
-use crate::split::{Leaves, Split, SplitError, Splitter};
+use crate::split::{self, Leaves, Split, SplitError, Splitter};
 
+use super::differential::Differential;
 use super::strain::{Base, Invariant};
 use super::{DeriveError, Session};
 
@@ -30,6 +33,8 @@ pub struct NearStress {
     pub cauchy: Vec<Expr>,
     /// Positive where they hold.
     pub holds: Expr,
+    /// The quantities that were split: each with the symbols of its change and of its value.
+    split: Vec<(Symbol, Option<Symbol>, Option<Symbol>)>,
 }
 
 impl Session {
@@ -78,6 +83,43 @@ impl Session {
         Ok((Some(NearEnergy { value, holds }), at_rest))
     }
 
+    /// The textbook energy with its volumetric part, if this vanishes to second order where J = 1, split there: a body
+    /// may keep its volume far from rest, and nearly incompressible ones do.
+    pub(super) fn split_at_unit_volume(&mut self, energy: Expr) -> Expr {
+        let used = self.strain.invariants();
+        let (Some(&(_, j)), Expr::Sum(terms)) = (used.iter().find(|(i, _)| *i == Invariant::J), &energy) else {
+            return energy;
+        };
+        let volumetric = |t: &Expr| {
+            let mut varying = t.symbols().into_iter().filter(|s| !self.quantities.is_constant(*s)).peekable();
+            varying.peek().is_some() && varying.all(|s| s == j)
+        };
+        let (volumetric, mut others): (Vec<Expr>, Vec<Expr>) = terms.iter().cloned().partition(volumetric);
+        let volumetric = Expr::Sum(volumetric);
+        // Polynomials in J - 1 lose nothing.
+        if self.quantities.is_polynomial(&volumetric) {
+            return energy;
+        }
+        let less_one = self.quantities.stage("J_less_1", Expr::from(j) - Expr::int(1));
+        let leaves = Leaves { others: vec![(j, split::linear(Expr::int(1), less_one))], ..Leaves::default() };
+        let splitter = Splitter::of_energy(&mut self.cas, &mut self.quantities, &mut self.rest, "energy_far", leaves);
+        let noted = splitter.rewrites();
+        let Some((value, rest)) = splitter.of_second_order(&volumetric) else {
+            self.rest.rewrites.truncate(noted);
+            return energy;
+        };
+        // Below 1/2 the differences from 1 would cancel.
+        let value = Value::Select {
+            left: j.into(),
+            right: Expr::ratio(1, 2),
+            then: value,
+            otherwise: volumetric - rest.clone(),
+        };
+        others.push(self.quantities.add("volumetric", Kind::Stage { value, partials: None }).into());
+        others.push(rest);
+        Expr::Sum(others)
+    }
+
     /// The stress split to first order, if a rule applies.
     pub(super) fn near_stress(&mut self, stress: &[Expr; 9]) -> Result<Option<NearStress>, DeriveError> {
         let jacobian = self.strain.jacobian(&mut self.cas, &mut self.quantities);
@@ -118,11 +160,79 @@ impl Session {
         for s in deformation {
             f.push(splitter.split(&s.into())?.value);
         }
+        let split = splitter.split_quantities();
         let stress: [Expr; 9] = near.try_into().expect("nine components");
         let cauchy = self.cauchy_of(&stress, &j, &f);
         let bounded = !uses_j || self.strain.has_stretch_sums();
         let holds = self.near_rest(uses_j.then_some(j), bounded)?;
-        Ok(Some(NearStress { stress, margin, cauchy, holds }))
+        Ok(Some(NearStress { stress, margin, cauchy, holds, split }))
+    }
+
+    /// The differential of the stress from its form near rest, and pairs of quantities and what to compute for them.
+    ///
+    /// Nothing in a textbook tangent cancels but the large second derivatives by J of isochoric energies, whose parts
+    /// that are the same in every direction are added here before they are multiplied by anything that is rounded.
+    pub(super) fn near_increment(
+        &mut self,
+        near: &NearStress,
+        dgradient: &[Symbol],
+    ) -> Result<(Vec<Expr>, Vec<(Symbol, Symbol)>), DeriveError> {
+        let stress_symbols: Vec<Symbol> = near.stress.iter().flat_map(|e| e.symbols()).collect();
+        let (mut same, mut instead) = (BTreeMap::new(), vec![]);
+        for &(s, change, value) in &near.split {
+            for part in [change, value].into_iter().flatten().filter(|x| !stress_symbols.contains(x)) {
+                same.insert(part, s);
+            }
+            instead.extend(value.map(|value| (s, value)));
+        }
+        // Sums of powers of principal stretches come from one decomposition, with their differentials.
+        for s in self.strain.near_stretch_sums(&mut self.quantities) {
+            let mut replace = |q: Symbol, change: Symbol, rest: i128| {
+                same.remove(&change);
+                same.insert(q, change);
+                let value = self.quantities.stage("value", Expr::int(rest) + change.into());
+                instead.push((q, value));
+            };
+            replace(s.sum, s.change, 3);
+            for (k, (moment, change)) in s.moment.into_iter().zip(s.moment_change).enumerate() {
+                replace(moment, change, i128::from(k < 3));
+            }
+        }
+        let mut expressions = vec![];
+        for p in &near.stress {
+            let p = match p {
+                Expr::Symbol(s) => match &self.quantities.get(*s).kind {
+                    Kind::Stage { value: Value::Expr(e), partials: None } => e.clone(),
+                    _ => p.clone(),
+                },
+                _ => p.clone(),
+            };
+            let p = self.cas.normalize(&p)?;
+            expressions.push(self.gathered(p, &same));
+        }
+        let seeds = self.strain.gradient().iter().copied().zip(dgradient.iter().map(|&s| s.into())).collect();
+        let differential = Differential::new(&mut self.cas, &mut self.quantities, "d", seeds, vec![]);
+        let mut differential = differential.with_same(same);
+        let increment: Result<Vec<Expr>, _> = expressions.iter().map(|p| differential.of(p)).collect();
+        Ok((increment?, instead))
+    }
+
+    /// A sum with its multiples of changes gathered into one quantity, so that nothing is factored out of them.
+    fn gathered(&mut self, e: Expr, changes: &BTreeMap<Symbol, Symbol>) -> Expr {
+        let Expr::Sum(terms) = &e else { return e };
+        let is_change = |t: &Expr| match t {
+            Expr::Symbol(s) => changes.contains_key(s),
+            Expr::Product(factors) => {
+                matches!(factors.as_slice(), [Expr::Number(_), Expr::Symbol(s)] if changes.contains_key(s))
+            }
+            _ => false,
+        };
+        let (changes, mut others): (Vec<Expr>, Vec<Expr>) = terms.iter().cloned().partition(is_change);
+        if changes.len() < 2 {
+            return e;
+        }
+        others.push(self.quantities.stage("pressure", Expr::Sum(changes)).into());
+        Expr::Sum(others)
     }
 
     /// I2, if in use, and tr A, II(A), 2 tr A + II(A): I2 = 3 + 2 tr A + II(A).

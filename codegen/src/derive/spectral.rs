@@ -205,11 +205,18 @@ impl Spectrum {
         least * relative / gap
     }
 
-    /// T_a - 3, without cancellation near rest with [`Spectrum::near_rest`].
-    pub fn first_order(&self, quantities: &mut Quantities, exponent: &Expr) -> Symbol {
+    /// T_a - 3, without cancellation near rest with [`Spectrum::near_rest`]; with its derivatives by M - I.
+    pub fn first_order(&self, quantities: &mut Quantities, exponent: &Expr, moment_change: &[Symbol; 6]) -> Symbol {
         let half = half(exponent);
         let terms = (0..3).map(|p| self.power_from_one(p, &half)).collect();
-        quantities.stage("T_1", Expr::Sum(terms))
+        let partials = (0..6).map(|kl| {
+            let (k, l) = SYMMETRIC[kl];
+            let change = Expr::from(moment_change[kl]);
+            let moment = if k == l { Expr::int(1) + change } else { change };
+            (self.strain[kl], Expr::int(if k == l { 1 } else { 2 }) * half.clone() * moment)
+        });
+        let partials = Some(partials.collect());
+        quantities.add("T_1", Kind::Stage { value: Value::Expr(Expr::Sum(terms)), partials })
     }
 
     /// T_a - 3 - (a/2) tr A, of second order in A: the sum over p of expm1mx(t_p) - (a/2) log1pmx(a_p), where

@@ -116,8 +116,8 @@ pub struct Strain {
     /// The exponents of the sums of principal stretches, and the decomposition that they share.
     exponents: Vec<Expr>,
     spectrum: Option<Spectrum>,
-    /// The decomposition for what is split at rest.
-    near_spectrum: Option<Spectrum>,
+    /// The sums in forms that are split at rest.
+    near_sums: Vec<NearStretchSum>,
     invariants: BTreeMap<Invariant, Symbol>,
 }
 
@@ -142,7 +142,7 @@ impl Strain {
             cofactors: None,
             exponents: vec![],
             spectrum: None,
-            near_spectrum: None,
+            near_sums: vec![],
             invariants: BTreeMap::new(),
         }
     }
@@ -194,6 +194,11 @@ impl Strain {
         let components: [Symbol; 6] = components.try_into().expect("six components were pushed");
         self.bases.insert(base, components);
         Ok(components)
+    }
+
+    /// The symbol of J, if in use.
+    pub fn jacobian_in_use(&self) -> Option<Symbol> {
+        self.jacobian
     }
 
     /// The cofactors K = dJ/dF.
@@ -329,20 +334,22 @@ impl Strain {
     /// The sums of powers of the principal stretches in use, in forms that are split at rest.
     pub fn near_stretch_sums(&mut self, quantities: &mut Quantities) -> Vec<NearStretchSum> {
         let (Some(spectrum), Some(strain)) = (&self.spectrum, self.bases.get(&Base::A)) else { return vec![] };
-        let near = self.near_spectrum.get_or_insert_with(|| Spectrum::near_rest(quantities, *strain));
-        let mut sums = Vec::new();
-        for (k, exponent) in self.exponents.iter().enumerate() {
-            let Some(&sum) = self.invariants.get(&Invariant::StretchSum(k)) else { continue };
-            sums.push(NearStretchSum {
-                sum,
-                half: spectral::half(exponent),
-                change: near.first_order(quantities, exponent),
-                remainder: near.second_order(quantities, exponent),
-                moment: spectrum.moment(k),
-                moment_change: near.moment_from_rest(quantities, exponent),
-            });
+        if self.near_sums.is_empty() {
+            let mut near = Spectrum::near_rest(quantities, *strain);
+            for (k, exponent) in self.exponents.iter().enumerate() {
+                let Some(&sum) = self.invariants.get(&Invariant::StretchSum(k)) else { continue };
+                let moment_change = near.moment_from_rest(quantities, exponent);
+                self.near_sums.push(NearStretchSum {
+                    sum,
+                    half: spectral::half(exponent),
+                    change: near.first_order(quantities, exponent, &moment_change),
+                    remainder: near.second_order(quantities, exponent),
+                    moment: spectrum.moment(k),
+                    moment_change,
+                });
+            }
         }
-        sums
+        self.near_sums.clone()
     }
 
     /// The derivatives of a strain component or of J by the components of G, as (3 i + j, derivative).

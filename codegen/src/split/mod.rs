@@ -102,6 +102,11 @@ impl Split {
     }
 }
 
+/// A value that is a constant and a linear invariant, to second order.
+pub fn linear(rest: Expr, change: Symbol) -> Split {
+    Split { second: Some(Second::linear(change)), ..Split::given(rest, change) }
+}
+
 /// What the kernels of one derivation share: known constants, and the rewrites for the reader.
 #[derive(Debug, Default)]
 pub struct Rest {
@@ -184,6 +189,19 @@ impl<'a> Splitter<'a> {
         self.known.contains_key(&s)
     }
 
+    /// The quantities that were split, in order: each with the symbols of its change and of its value, where these are
+    /// not the quantity itself.
+    pub fn split_quantities(&self) -> Vec<(Symbol, Option<Symbol>, Option<Symbol>)> {
+        let symbol = |e: &Expr, s: Symbol| match e {
+            Expr::Symbol(x) if *x != s => Some(*x),
+            _ => None,
+        };
+        let mut all: Vec<_> =
+            self.known.iter().map(|(&s, split)| (s, symbol(&split.change, s), symbol(&split.value, s))).collect();
+        all.sort();
+        all
+    }
+
     /// A comparison as the change of its difference and the threshold that this is compared with, if a rule applies.
     ///
     /// # Errors
@@ -192,6 +210,11 @@ impl<'a> Splitter<'a> {
         let difference = self.split(&(left.clone() - right.clone()))?;
         let threshold = self.simplify(Expr::int(-1) * difference.rest)?;
         Ok(difference.rewritten.0.then_some((difference.change, threshold)))
+    }
+
+    /// How many rewrites were noted so far.
+    pub fn rewrites(&self) -> usize {
+        self.rest.rewrites.len()
     }
 
     /// An expression as text.

@@ -4,8 +4,10 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use num_traits::{One, Zero};
+
 use crate::cas::Cas;
-use crate::expr::{Expr, Symbol};
+use crate::expr::{Expr, Rational, Symbol};
 use crate::quantity::Quantities;
 
 use super::{Order, Rest, Split, SplitError, Splitter, total};
@@ -42,6 +44,12 @@ impl Second {
             order: 2,
             is_whole: false,
         }
+    }
+
+    /// A change that is a linear invariant.
+    pub(super) fn linear(invariant: Symbol) -> Self {
+        let linear = BTreeMap::from([(invariant, Expr::int(1))]);
+        Self { linear, remainder: Expr::int(0), order: 2, is_whole: false }
     }
 
     /// A change of first order that is no linear form.
@@ -129,6 +137,13 @@ impl<'a> Splitter<'a> {
         Ok((rewritten.then_some(second.remainder), split.rest))
     }
 
+    /// The value counted from rest, where it is of second order there and a rule applies; and its constant.
+    pub fn of_second_order(mut self, e: &Expr) -> Option<(Expr, Expr)> {
+        let split = self.split(e).ok()?;
+        let second = split.second.filter(|s| s.linear.is_empty() && s.order == 2)?;
+        split.rewritten.0.then_some((second.remainder, split.rest))
+    }
+
     pub(super) fn second_of_sum(&mut self, parts: &[Split], change: &Expr) -> Result<Second, SplitError> {
         let seconds: Vec<&Second> = parts.iter().filter_map(|p| p.second.as_ref()).collect();
         let mut linear: BTreeMap<Symbol, Vec<Expr>> = BTreeMap::new();
@@ -142,7 +157,7 @@ impl<'a> Splitter<'a> {
         if seconds.iter().all(|s| s.is_whole) {
             return Ok(Second { linear, remainder: change.clone(), order, is_whole: true });
         }
-        let remainder = total(seconds.iter().map(|s| s.remainder.clone()));
+        let remainder = merged(total(seconds.iter().map(|s| s.remainder.clone())));
         Ok(Second { linear, remainder, order, is_whole: false })
     }
 
@@ -220,4 +235,33 @@ impl<'a> Splitter<'a> {
         }
         Ok(linear)
     }
+}
+
+/// A sum with its numbers multiplied in and equal terms merged: what cancels does so here.
+fn merged(e: Expr) -> Expr {
+    fn collect(e: &Expr, factor: Rational, terms: &mut Vec<(Rational, Expr)>) {
+        match e {
+            Expr::Sum(parts) => parts.iter().for_each(|part| collect(part, factor, terms)),
+            Expr::Product(factors) => match factors.as_slice() {
+                [Expr::Number(q), rest] | [rest, Expr::Number(q)] => collect(rest, factor * q, terms),
+                [Expr::Number(q), rest @ ..] => add(Expr::Product(rest.to_vec()), factor * q, terms),
+                _ => add(e.clone(), factor, terms),
+            },
+            Expr::Number(q) => add(Expr::int(1), factor * q, terms),
+            _ => add(e.clone(), factor, terms),
+        }
+    }
+    fn add(e: Expr, factor: Rational, terms: &mut Vec<(Rational, Expr)>) {
+        match terms.iter_mut().find(|(_, x)| *x == e) {
+            Some((sum, _)) => *sum += factor,
+            None => terms.push((factor, e)),
+        }
+    }
+    let mut terms = vec![];
+    collect(&e, Rational::one(), &mut terms);
+    if terms.iter().all(|(q, _)| !q.is_zero()) {
+        return e;
+    }
+    let product = |(q, e): (Rational, Expr)| if q.is_one() { e } else { Expr::Number(q) * e };
+    total(terms.into_iter().filter(|(q, _)| !q.is_zero()).map(product))
 }
