@@ -174,6 +174,7 @@ mod gpu {
             motions: vec![],
             loads: vec![],
             mass_damping: 0.0,
+            stiffness_damping: 0.0,
             diameter: 1.0,
             volume: count as f64,
         }

@@ -141,7 +141,7 @@ fn the_solver_reads_once_a_submission() {
             let ones = backend.upload(&vec![[1.0; 3]; body.masses.len()]);
             let rest = backend.zeros();
             field.prepare(&backend, &rest);
-            let operator = Operator { masses: &masses, mass: 0.0, stiffness: 1.0 };
+            let operator = Operator { masses: &masses, mass: 0.0, stiffness: 1.0, damping: None };
             let mut cg = ConjugateGradient::new(&backend);
             let mut solve = |tolerance, max_iterations| {
                 let mut x = backend.zeros();

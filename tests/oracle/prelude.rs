@@ -199,6 +199,55 @@ impl Strain {
     }
 }
 
+/// The rates of what [`Strain`] has.
+#[derive(Clone, Copy)]
+#[allow(non_snake_case)] // the names of the law language
+pub struct StrainRate {
+    pub eps: Tensor,
+    pub E: Tensor,
+    pub C: Tensor,
+    pub I1: Number,
+    pub I2: Number,
+    pub I3: Number,
+    pub J: Number,
+    pub I1bar: Number,
+    pub I2bar: Number,
+}
+
+impl StrainRate {
+    /// At G, where G changes by `rate`.
+    pub fn of(g: [Number; 9], rate: [Number; 9]) -> Self {
+        let (half, two, three) = (lit(0.5), lit(2.0), lit(3.0));
+        let s = Strain::of(g);
+        let (f, l) = (Tensor(g) + identity(), Tensor(rate));
+        let at = |t: &Tensor, i: usize, j: usize| t.0[3 * i + j];
+        let column = |i: usize, j: usize| {
+            let term = |k: usize| at(&f, k, i) * at(&l, k, j) + at(&l, k, i) * at(&f, k, j);
+            term(0) + term(1) + term(2)
+        };
+        let c = Tensor(std::array::from_fn(|k| column(k / 3, k % 3)));
+        let i1 = tr(c);
+        let i2 = s.I1 * i1 - ddot(s.C, c);
+        // dJ/dt: the determinants with one row of F replaced by that of its rate.
+        let row = |i: usize| det(Tensor(std::array::from_fn(|k| if k / 3 == i { l.0[k] } else { f.0[k] })));
+        let j = row(0) + row(1) + row(2);
+        let share = j / s.J;
+        let square = (s.J * s.J).powf(lit(1.0) / three);
+        let eps = Tensor(std::array::from_fn(|k| half * (rate[k] + rate[3 * (k % 3) + k / 3])));
+        Self {
+            eps,
+            E: c * half,
+            C: c,
+            I1: i1,
+            I2: i2,
+            I3: two * s.J * j,
+            J: j,
+            I1bar: i1 / square - two / three * s.I1bar * share,
+            I2bar: i2 / (square * square) - lit(4.0) / three * s.I2bar * share,
+        }
+    }
+}
+
 impl Strain {
     /// The sum of the principal stretches to a power that depends on parameters alone.
     pub fn stretch_sum(self, exponent: Number) -> Number {

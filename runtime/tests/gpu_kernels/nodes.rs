@@ -123,7 +123,7 @@ fn product<B: Backend, F: ForceField<B>>(on: &mut On<B, F>, body: &Shared, runni
     let mut registers = backend.registers(registers);
     let u = backend.upload(&body.u);
     field.prepare(backend, &u);
-    let operator = Operator { masses: &masses, mass: OPERATOR.0, stiffness: OPERATOR.1 };
+    let operator = Operator { masses: &masses, mass: OPERATOR.0, stiffness: OPERATOR.1, damping: None };
     field.product(backend, &operator, &x, &mut y, &mut registers);
     backend.update::<Keep>(&mut registers);
     let values = backend.download(&y).into_flattened();

@@ -49,6 +49,7 @@ pub fn body(elements: Vec<[u32; 4]>, rest: &[RestElement<f64>], batches: Vec<Law
         motions: vec![],
         loads: vec![],
         mass_damping: 0.0,
+        stiffness_damping: 0.0,
         diameter: 1.0,
         volume: rest.iter().map(|r| r.volume).sum(),
         elements,

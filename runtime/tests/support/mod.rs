@@ -185,6 +185,7 @@ pub fn body(mesh: &TetMesh, law: &'static LawEntry, parameters: &[f64], imposed:
         motions: imposed.iter().map(|&(_, _, value)| History::constant(value)).collect(),
         loads: vec![],
         mass_damping: 0.0,
+        stiffness_damping: 0.0,
         diameter: (0..3).map(|i| (high[i] - low[i]).powi(2)).sum::<f64>().sqrt(),
         volume: mesh.total_volume(),
     }
