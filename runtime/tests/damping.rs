@@ -3,7 +3,7 @@
 
 mod support;
 
-use support::{Cpu, Random, body, done, parameters, probe, relative, system};
+use support::{Cpu, Random, body, done, parameters, probe, relative, system, viscous};
 use tensormass_runtime::LawEntry;
 use tensormass_runtime::backend::{Backend, ForceField};
 use tensormass_runtime::cg::CgLimits;
@@ -40,20 +40,6 @@ fn advance(system: &mut Cpu<f64>, stepper: &mut Stepper, state: &mut State<CpuBa
     stepper.step(system, state, h).unwrap_or_else(|e| panic!("{e}"));
     state.step += 1;
     state.time = h * state.step as f64;
-}
-
-/// The parameters of [`parameters`], with viscosities (Pa s) of this size instead of its own, the k-th k times as large.
-fn viscous(law: &LawEntry, viscosity: f64) -> Vec<f64> {
-    let mut values = parameters(law);
-    let (mut first, mut k) = (0, 0);
-    for p in law.info.parameters {
-        if p.dimensions == [0, 1, 1] {
-            k += 1;
-            values[first..first + p.len].fill(f64::from(k) * viscosity);
-        }
-        first += p.len;
-    }
-    values
 }
 
 fn dissipative() -> Vec<&'static LawEntry> {
