@@ -110,8 +110,9 @@ impl Session {
         if !self.has_stress_at_rest(density, rates)? {
             return Ok(());
         }
-        let terms = if let Expr::Sum(terms) = density { terms.as_slice() } else { std::slice::from_ref(density) };
-        let mut named = density;
+        let expanded = self.cas.expand(density)?;
+        let terms = if let Expr::Sum(terms) = &expanded { terms.as_slice() } else { std::slice::from_ref(&expanded) };
+        let mut named = &expanded;
         for term in terms {
             if self.has_stress_at_rest(term, rates)? {
                 named = term;

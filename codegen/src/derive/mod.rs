@@ -42,8 +42,8 @@ pub enum DeriveError {
     Split(#[from] SplitError),
     /// The dissipation stresses a body whose strain does not change.
     #[error(
-        "the dissipation begins with a term of first order in the strain rate, `{0}`: a body at rest would be stressed; \
-         write it in squares and products of rates"
+        "the dissipation begins with a term of first order in the strain rate, `{0}` (At is dC/dt, Jt is dJ/dt): a body at \
+         rest would be stressed; write it in squares and products of rates"
     )]
     DampingAtRest(String),
     /// The law uses something that this version cannot differentiate.

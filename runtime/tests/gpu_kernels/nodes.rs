@@ -175,14 +175,15 @@ fn check(gpu: &Arc<Gpu>, body: &Shared, options: GpuOptions, analysis: &Analysis
         println!("{what}: {:.3} of the bound", compare(&what, &found, &wanted, &bounds));
         all.push(found);
     }
+    let masses = body.body.masses.iter().flat_map(|&m| [m, 2.0 * m, 4.0 * m]).map(Bound::exact);
+    let x: Vec<Bound> = body.du.iter().flatten().copied().map(Bound::exact).collect();
+    let first: Vec<Bound> = masses.zip(&x).map(|(m, &x)| Bound::exact(OPERATOR.0) * m * x).collect();
+    // Slots hold -K x.
+    let undamped = body.sums(Kernel::DForce, -OPERATOR.1, analysis, pages, &first);
     for damped in [false, true] {
         let (wanted, _) = product(&mut cpu, body, 1.0, damped);
         let (found, dot) = product(&mut on, body, 1.0, damped);
-        let masses = body.body.masses.iter().flat_map(|&m| [m, 2.0 * m, 4.0 * m]).map(Bound::exact);
-        let x: Vec<Bound> = body.du.iter().flatten().copied().map(Bound::exact).collect();
-        let first: Vec<Bound> = masses.zip(&x).map(|(m, &x)| Bound::exact(OPERATOR.0) * m * x).collect();
-        // Slots hold -K x.
-        let mut bounds = body.sums(Kernel::DForce, -OPERATOR.1, analysis, pages, &first);
+        let mut bounds = undamped.clone();
         if damped {
             bounds = body.sums(Kernel::DDamping, -DAMPING.0, analysis, pages, &bounds);
             bounds = body.sums(Kernel::DForce, -DAMPING.1, analysis, pages, &bounds);
