@@ -13,6 +13,8 @@ use tensormass_runtime::integrate::{
 };
 use tensormass_runtime::laws;
 use tensormass_runtime::mesh::{Groups, NodeId, TetMesh, beam};
+use tensormass_runtime::model::build;
+use tensormass_runtime::plan::{Layout, Plan};
 use tensormass_runtime::scene::{Preconditioner, Scene};
 use tensormass_runtime::simulate::Outcome;
 use tensormass_runtime::step_limit::{element_limit, power_limit};
@@ -317,6 +319,44 @@ fn rotation_is_free() {
             "{}: {of_rotation:e} of {of_noise:e}",
             law.info.name
         );
+    }
+}
+
+/// A scene pays for the damping that it has: passes and kernels of the plan.
+#[test]
+fn plans_show_what_damps() {
+    let plan = |set: &[&str]| {
+        let scene = support::scene(CREEP, set);
+        let model = build(&scene).unwrap_or_else(|e| panic!("{e}"));
+        let plan = Plan::new(&scene, &model, Layout::Gpu);
+        let kernels: Vec<&str> = plan.laws[0].kernels.iter().map(|(name, _)| *name).collect();
+        (plan.passes.join("; "), kernels.join(" "), plan.left_out.join("; "))
+    };
+    let elastic = ["material.0.law=neo_hookean", "material.0.parameters={ young = 2.6e6, poisson = 0.3 }"];
+    let explicit = "solver.integrator=central-difference";
+    let beta = "solver.stiffness_damping=1e-3";
+    for (set, passes, kernels) in [
+        (
+            vec![],
+            vec!["damping forces", "diagonal of damping", "differentials of damping"],
+            "damping ddamping damping_diagonal",
+        ),
+        (vec![explicit], vec!["damping forces"], "damping"),
+        (vec!["solver.integrator=static"], vec![], ""),
+        (elastic.to_vec(), vec![], ""),
+        ([&elastic[..], &[beta]].concat(), vec!["stiffness damping"], ""),
+        // The tangent of a linearised step is that of Rayleigh's part.
+        ([&elastic[..], &[beta, "solver.newton.max_iterations=1"]].concat(), vec![], ""),
+        ([&elastic[..], &[beta, explicit]].concat(), vec!["differentials of the velocity"], ""),
+    ] {
+        let (found, run, left_out) = plan(&set);
+        assert!(passes.iter().all(|pass| found.contains(pass)), "{set:?}: {found}");
+        let words = found.matches("damping").count() + found.matches("of the velocity").count();
+        assert_eq!(words, passes.len(), "{set:?}: {found}");
+        let damping: Vec<&str> = run.split(' ').filter(|name| name.contains("damping")).collect();
+        assert_eq!(damping.join(" "), kernels, "{set:?}: {run}");
+        assert_eq!(left_out.contains("viscosity"), kernels.is_empty(), "{set:?}: {left_out}");
+        assert_eq!(left_out.contains("stiffness damping"), !set.contains(&beta), "{set:?}: {left_out}");
     }
 }
 
