@@ -203,6 +203,8 @@ impl Strain {
 #[derive(Clone, Copy)]
 #[allow(non_snake_case)] // the names of the law language
 pub struct StrainRate {
+    /// The strain that changes.
+    at: Strain,
     pub eps: Tensor,
     pub E: Tensor,
     pub C: Tensor,
@@ -235,6 +237,7 @@ impl StrainRate {
         let square = (s.J * s.J).powf(lit(1.0) / three);
         let eps = Tensor(std::array::from_fn(|k| half * (rate[k] + rate[3 * (k % 3) + k / 3])));
         Self {
+            at: s,
             eps,
             E: c * half,
             C: c,
@@ -271,6 +274,38 @@ impl Strain {
     }
     pub fn I5bar(self, a: Direction) -> Number {
         self.I5(a) / self.I3.powf(lit(2.0) / lit(3.0))
+    }
+}
+
+#[allow(non_snake_case)] // the names of the law language
+impl StrainRate {
+    /// The rate of the sum of the principal stretches to a power: part by part of the rate of C, in which it is linear.
+    pub fn stretch_sum(self, exponent: Number) -> Number {
+        let along = |part: fn(Number) -> Rounded| {
+            let moving = |k: usize| Number { a: part(self.C.0[k]), ..constant(self.at.C.0[k].x) };
+            stretches::trace_of_power(Tensor(std::array::from_fn(moving)), exponent.x * Rounded::exact(0.5)).a
+        };
+        Number { x: along(|n| n.x), a: along(|n| n.a), b: along(|n| n.b), c: along(|n| n.c) }
+    }
+    pub fn I4(self, a: Direction) -> Number {
+        between(a, self.C, a)
+    }
+    pub fn I5(self, a: Direction) -> Number {
+        // Of a . C^2 . a, with the symmetric C and its rate.
+        let [c, rate] = [self.at.C, self.C]
+            .map(|t| [0, 1, 2].map(|i| (0..3).map(|j| t.0[3 * i + j] * a.0[j]).reduce(|x, y| x + y)));
+        (0..3).map(|i| lit(2.0) * c[i].expect("three") * rate[i].expect("three")).reduce(|x, y| x + y).expect("three")
+    }
+    pub fn I8(self, a: Direction, b: Direction) -> Number {
+        between(a, self.C, b)
+    }
+    pub fn I4bar(self, a: Direction) -> Number {
+        let share = self.I3 / self.at.I3;
+        self.I4(a) / self.at.I3.powf(lit(1.0) / lit(3.0)) - share / lit(3.0) * self.at.I4bar(a)
+    }
+    pub fn I5bar(self, a: Direction) -> Number {
+        let share = self.I3 / self.at.I3;
+        self.I5(a) / self.at.I3.powf(lit(2.0) / lit(3.0)) - lit(2.0) * share / lit(3.0) * self.at.I5bar(a)
     }
 }
 

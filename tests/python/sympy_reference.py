@@ -198,8 +198,13 @@ class Law:
                 self.next()
                 name = self.next()
                 if self.accept("("):
-                    function = FIBRES[name] if name in FIBRES else FUNCTIONS[name]
-                    value = function(value, *self.arguments(scope, ")"))
+                    arguments = self.arguments(scope, ")")
+                    if name in FIBRES and "along" in value:
+                        value = sp.diff(FIBRES[name](value["along"], *arguments), T).subs(T, 0)
+                    elif name == "stretch_sum" and "along" in value:
+                        raise NotImplementedError("rates of sums of stretches")
+                    else:
+                        value = (FIBRES[name] if name in FIBRES else FUNCTIONS[name])(value, *arguments)
                 else:
                     value = value[name]
             elif self.accept("["):
@@ -362,7 +367,9 @@ T = sp.symbols("t")
 def strain_rate(g, rate):
     """The rates of the strain where G changes by `rate`, as derivatives along a line in time."""
     along = strain(g + T * rate)
-    return {name: sp.diff(value, T).subs(T, 0) for name, value in along.items()}
+    rates = {name: sp.diff(value, T).subs(T, 0) for name, value in along.items()}
+    # For the invariants with fibres, which are functions of the strain and not among its values.
+    return {**rates, "along": along}
 
 
 def matrix(numerators, denominator):
