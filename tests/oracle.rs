@@ -59,6 +59,51 @@ fn check(law: &'static LawEntry, seed: u64, stretch: (f64, f64)) {
     }
 }
 
+/// Compares D, P_v and dP_v of a law with those of its own text at one state and rate.
+fn check_damping(law: &'static LawEntry, dissipation: Dissipation, seed: u64, stretch: (f64, f64)) {
+    let name = law.info.name;
+    let mut rng = Rng::new(seed);
+    let point = Point::new(env!("TENSORMASS_GENERATED"), law, rng.parameters(law.info));
+    let g = point.state(&mut rng, stretch);
+    let (rate, d) = (rng.direction(), rng.direction());
+    let parameters: Vec<_> = point.rounded.iter().map(|&p| prelude::parameter(p)).collect();
+    let still = g.map(|x| prelude::seeded(x, 0.0, 0.0));
+    let strain = prelude::Strain::of(still);
+    let (of_g, of_rate, of_d) = (exact(&g), exact(&rate), exact(&d));
+    let w = point.dissipation(&of_g, &of_rate);
+    let (p, dp) = (point.damping(&of_g, &of_rate), point.ddamping(&of_g, &of_rate, &of_d));
+    let magnitude = |a: &[Rounded]| a.iter().fold(0.0f64, |m, x| m.max(x.value.abs()));
+    let scale = magnitude(&dp).max(magnitude(&p));
+    let compare = |what: &str, kernel: Rounded, oracle: Rounded| {
+        let tolerance = (kernel.bound(DOUBLE) + oracle.bound(DOUBLE)).min(1e-9 * scale);
+        let difference = (kernel.value - oracle.value).abs();
+        let context = format!("{name}, seed {seed}, parameters {:?}, G {g:?}, rate {rate:?}", point.parameters);
+        let (kernel, oracle) = (kernel.value, oracle.value);
+        assert!(difference <= tolerance, "{what}: {kernel} against {oracle}, tolerance {tolerance:e}; {context}");
+    };
+    let of = |seeded| dissipation(strain, prelude::StrainRate::of(still, seeded), &parameters);
+    let at_rest = of([prelude::seeded(0.0, 0.0, 0.0); 9]).x;
+    for k in 0..9 {
+        let seeded = std::array::from_fn(|m| prelude::seeded(rate[m], if m == k { 1.0 } else { 0.0 }, d[m]));
+        let result = of(seeded);
+        compare("D", w, result.x - at_rest);
+        compare(&format!("P_v{k}"), p[k], result.a);
+        compare(&format!("dP_v{k}"), dp[k], result.c);
+    }
+}
+
+#[test]
+fn damping_is_the_derivative_of_the_law_text() {
+    let names: Vec<&str> = laws().iter().filter(|law| law.damping.is_some()).map(|law| law.info.name).collect();
+    assert_eq!(DISSIPATION.iter().map(|(name, _)| *name).collect::<Vec<_>>(), names);
+    for (name, dissipation) in DISSIPATION {
+        let law = laws().iter().find(|law| law.info.name == *name).expect("compared above");
+        for stretch in STRETCHES {
+            (0..STATES).for_each(|seed| check_damping(law, *dissipation, seed, stretch));
+        }
+    }
+}
+
 #[test]
 fn kernels_are_the_derivatives_of_the_law_text() {
     assert_eq!(ORACLE.len(), laws().len());

@@ -43,10 +43,11 @@ fn check(name: &str, text: &str) {
 }
 
 /// The passes of a law for review: of each, the parts between empty lines that no earlier one has.
-fn passes(shaders: &[wgsl::Shader; 5]) -> String {
+fn passes(shaders: &[wgsl::Shader; 5], damping: Option<&[wgsl::Shader; 3]>) -> String {
     let mut shown = HashSet::new();
     let mut out = String::new();
-    for (name, shader) in wgsl::NAMES.iter().zip(shaders) {
+    let damping = wgsl::DAMPING_NAMES.iter().zip(damping.into_iter().flatten());
+    for (name, shader) in wgsl::NAMES.iter().zip(shaders).chain(damping) {
         out += &format!("// ---- {name}: binds {:?}\n\n", shader.bindings);
         for part in shader.text.split("\n\n").filter(|part| shown.insert(*part)) {
             out += &format!("{}\n\n", part.trim_end());
@@ -69,7 +70,8 @@ fn each_reviewed_law() {
         let law = law::parse(&path, &text).expect("the build accepted it");
         let derivation = derivation(env!("TENSORMASS_GENERATED"), name);
         check(&format!("law_{name}"), &rust::format(rust::law_module(&law, &derivation, true)).expect("Rust"));
-        check(&format!("wgsl_{name}"), &passes(&wgsl::law_shaders(&law, &derivation, &element())));
+        let damping = wgsl::damping_shaders(&law, &derivation, &element());
+        check(&format!("wgsl_{name}"), &passes(&wgsl::law_shaders(&law, &derivation, &element()), damping.as_ref()));
     }
     eprintln!("skipped {unreviewed} unreviewed laws");
 }

@@ -1,4 +1,5 @@
-//! Reviewed laws against SymPy: 25-digit values of W, P, dP and the Cauchy stress, differentiated by another system.
+//! Reviewed laws against SymPy: 25-digit values of W, P, dP and the Cauchy stress, and where there is a dissipation of D,
+//! P_v and dP_v, differentiated by another system.
 //!
 //! `tests/python/sympy_reference.py` wrote `tests/reference/sympy/NAME.json` with a parser of its own; all states and
 //! materials are exact in f32. The tolerance is the kernel's rounding bound, in f64 and in f32. W counts from rest.
@@ -27,18 +28,28 @@ fn check(law: &'static LawEntry, state: &Value, context: &str) {
     assert_eq!(g32.map(f64::from), g, "{context}: G is exact in f32");
     let (bounded, rest, single) = (exact(&g), exact(&[0.0; 9]), &point.single);
     let dp = point.dforce(&bounded, &exact(&d));
-    // Of the tangent's magnitude, what a tolerance may be at most without proving nothing.
+    // Of the tangent's magnitude is what a tolerance may be at most without proving nothing.
     let scale = dp.iter().fold(0.0f64, |m, x| m.max(x.value.abs()));
     let energy = point.energy(&bounded) - point.energy(&rest);
     let energy32 = f64::from(single.energy(&g32).0) - f64::from(single.energy(&[0.0; 9]).0);
     let wide = |x: &[f32]| x.iter().copied().map(f64::from).collect::<Vec<f64>>();
-    let compared: [(&str, &[Rounded], Vec<f64>); 4] = [
-        ("W", &[energy], vec![energy32]),
-        ("P", &point.force(&bounded), wide(&single.force(&g32).0)),
-        ("dP", &dp, wide(&single.dforce(&g32, &d32))),
-        ("cauchy", &point.cauchy(&bounded), wide(&single.cauchy(&g32))),
+    let mut compared: Vec<(&str, Vec<Rounded>, Vec<f64>, f64)> = vec![
+        ("W", vec![energy], vec![energy32], scale),
+        ("P", point.force(&bounded).into(), wide(&single.force(&g32).0), scale),
+        ("dP", dp.into(), wide(&single.dforce(&g32, &d32)), scale),
+        ("cauchy", point.cauchy(&bounded).into(), wide(&single.cauchy(&g32)), scale),
     ];
-    for (what, double, single) in compared {
+    if law.damping.is_some() {
+        let rate = nine(&state["rate"]);
+        let (r32, moving) = (rate.map(|x| x as f32), exact(&rate));
+        let dp = point.ddamping(&bounded, &moving, &exact(&d));
+        let scale = dp.iter().fold(0.0f64, |m, x| m.max(x.value.abs()));
+        let density = f64::from(single.dissipation(&g32, &r32));
+        compared.push(("D", vec![point.dissipation(&bounded, &moving)], vec![density], scale));
+        compared.push(("P_v", point.damping(&bounded, &moving).into(), wide(&single.damping(&g32, &r32)), scale));
+        compared.push(("dP_v", dp.into(), wide(&single.ddamping(&g32, &r32, &d32)), scale));
+    }
+    for (what, double, single, scale) in compared {
         let expected = numbers(&state[what]);
         assert_eq!(expected.len(), double.len(), "{context}: {what}");
         for (k, value) in expected.iter().enumerate() {

@@ -55,6 +55,14 @@ fn element_passes_of_every_law() {
                 assert!(!is_free(name), "{what}: a value could be named like `{name}`");
             }
         }
+        let damping = law.damping.map(|d| [&d.shaders.damping, &d.shaders.ddamping, &d.shaders.diagonal]);
+        for (name, shader) in ["damping", "ddamping", "diagonal"].iter().zip(damping.into_iter().flatten()) {
+            let what = format!("{}, {name} of damping", law.info.name);
+            check(&what, shader);
+            for name in declared(shader.text) {
+                assert!(!is_free(name), "{what}: a value could be named like `{name}`");
+            }
+        }
     }
 }
 

@@ -120,11 +120,17 @@ fn check_law(law: &LawEntry, ir: &Derivation, seed: u64) {
         ),
         (Input::GradientIncrement, single(&rng.direction())),
         (Input::NodeGradient, single(&rng.direction()[..3])),
+        (Input::GradientRate, single(&rng.direction())),
     ];
     let s = law.shaders;
     for (name, shader) in
         [("energy", s.energy), ("force", s.force), ("dforce", s.dforce), ("diagonal", s.diagonal), ("cauchy", s.cauchy)]
     {
+        let what = format!("{}, {name}, seed {seed}", law.info.name);
+        check(&what, &Functions::parse(shader.text), ir.point(name), &inputs);
+    }
+    let Some(d) = law.damping.map(|d| d.shaders) else { return };
+    for (name, shader) in [("damping", d.damping), ("ddamping", d.ddamping), ("damping_diagonal", d.diagonal)] {
         let what = format!("{}, {name}, seed {seed}", law.info.name);
         check(&what, &Functions::parse(shader.text), ir.point(name), &inputs);
     }

@@ -107,11 +107,21 @@ pub const FAR: &str = "_far";
 
 /// The kernels of every law, in order.
 pub const KERNELS: [&str; 6] = ["material", "energy", "force", "dforce", "diagonal", "cauchy"];
+/// The kernels that follow them where a law has a dissipation.
+pub const DAMPING_KERNELS: [&str; 4] = ["dissipation", "damping", "ddamping", "damping_diagonal"];
 
 impl Derivation {
     /// The kernel of this name.
     pub fn kernel(&self, name: &str) -> &ValidKernel {
-        self.kernels.iter().find(|k| k.ir().name == name).expect("one of KERNELS")
+        self.kernels
+            .iter()
+            .find(|k| k.ir().name == name)
+            .expect("one of KERNELS, or of DAMPING_KERNELS where the law is dissipative")
+    }
+
+    /// Whether the law has a dissipation, and so the kernels of [`DAMPING_KERNELS`].
+    pub fn is_dissipative(&self) -> bool {
+        self.kernels.iter().any(|k| k.ir().name == DAMPING_KERNELS[0])
     }
 
     /// The constants of a material as printed code computes them: in twofold precision, each rounded once to f64.
@@ -199,7 +209,7 @@ impl Derivation {
         // A sibling follows its kernel.
         let is_sibling = |k: usize| k > 0 && found[k].strip_suffix(FAR) == Some(found[k - 1]);
         let base: Vec<&str> = (0..found.len()).filter(|&k| !is_sibling(k)).map(|k| found[k]).collect();
-        if base != KERNELS {
+        if base != KERNELS && base != [&KERNELS[..], &DAMPING_KERNELS].concat() {
             return Err(DerivationError::Kernels { expected: KERNELS.join(", "), found: found.join(", ") });
         }
         Ok(Self { law, hash, constants, energy_at_rest, rewrites, kernels })

@@ -10,14 +10,15 @@ use std::collections::HashSet;
 use proc_macro2::{Group, Ident, TokenStream, TokenTree};
 use quote::{format_ident, quote};
 
-/// A law file as a module's content: its items, and `oracle`, which evaluates the energy from all parameter components.
+/// A law file as a module's content: its items, and `oracle`, which evaluates the energy from all parameter components;
+/// where there is a dissipation, `dissipation_oracle` evaluates that.
 ///
 /// # Errors
 /// The text is not Rust.
 pub fn module(text: &str) -> Result<String, syn::Error> {
     let mut items = syn::parse_file(text)?.items;
     let mut constants = HashSet::new();
-    let (mut fields, mut parts) = (vec![], vec![]);
+    let (mut fields, mut parts, mut damping) = (vec![], vec![], vec![]);
     let mut components = 0_usize;
     for item in &mut items {
         match item {
@@ -48,6 +49,9 @@ pub fn module(text: &str) -> Result<String, syn::Error> {
                 if f.sig.ident.to_string().starts_with("energy_density") {
                     parts.push(f.sig.ident.clone());
                 }
+                if f.sig.ident.to_string().starts_with("dissipation_density") {
+                    damping.push(f.sig.ident.clone());
+                }
             }
             syn::Item::Const(c) => {
                 c.attrs.clear();
@@ -72,8 +76,18 @@ pub fn module(text: &str) -> Result<String, syn::Error> {
             rewrite(quote!(#item), &renamed)
         })
         .collect();
+    let dissipation = (!damping.is_empty()).then(|| {
+        quote! {
+            /// The dissipation density: the sum of the file's parts.
+            pub fn dissipation_oracle(strain: Strain, rate: StrainRate, parameters: &[f64]) -> f64 {
+                let parameters = Parameters { #(#fields),* };
+                #(#damping(strain, rate, parameters))+*
+            }
+        }
+    });
     let file = quote! {
         #text
+        #dissipation
         /// The energy density: the sum of the file's parts.
         pub fn oracle(strain: Strain, parameters: &[f64]) -> f64 {
             let parameters = Parameters { #(#fields),* };
@@ -83,18 +97,20 @@ pub fn module(text: &str) -> Result<String, syn::Error> {
     Ok(prettyplease::unparse(&syn::parse2(file)?))
 }
 
-/// One module a law, and the table of their names and `oracle` functions. `super::prelude` is the includer's: `Number`
+/// One module a law, and the tables of their names and `oracle` functions, and of the `dissipative` ones. `super::prelude` is the includer's: `Number`
 /// (the number type), `Strain`, `Direction` (three numbers) and the functions of the law language.
 ///
 /// # Errors
 /// A defect of this printer.
-pub fn table(names: &[&str]) -> Result<String, syn::Error> {
+pub fn table(names: &[&str], dissipative: &[&str]) -> Result<String, syn::Error> {
+    let damped = dissipative.iter().map(|n| format_ident!("{n}"));
+    let damped_texts = dissipative.iter().map(ToString::to_string);
     let names: Vec<Ident> = names.iter().map(|n| format_ident!("{n}")).collect();
     let paths = names.iter().map(|n| format!("/oracle/{n}.rs"));
     let texts = names.iter().map(ToString::to_string);
     let file = quote! {
         #(
-            #[allow(unused_imports, unused_qualifications, non_snake_case, clippy::identity_op)]
+            #[allow(unused_imports, unused_variables, unused_qualifications, non_snake_case, clippy::identity_op)]
             mod #names {
                 #[allow(non_camel_case_types)]
                 type f64 = super::prelude::Number;
@@ -106,6 +122,10 @@ pub fn table(names: &[&str]) -> Result<String, syn::Error> {
         pub type Oracle = fn(prelude::Strain, &[prelude::Number]) -> prelude::Number;
         /// Every law's energy density by its own text, by name.
         pub const ORACLE: &[(&str, Oracle)] = &[#((#texts, #names::oracle)),*];
+        /// From the strain, its rate and all parameter components to the dissipation density.
+        pub type Dissipation = fn(prelude::Strain, prelude::StrainRate, &[prelude::Number]) -> prelude::Number;
+        /// Every law's dissipation density by its own text, by name, where it has one.
+        pub const DISSIPATION: &[(&str, Dissipation)] = &[#((#damped_texts, #damped::dissipation_oracle)),*];
     };
     Ok(prettyplease::unparse(&syn::parse2(file)?))
 }

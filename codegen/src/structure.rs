@@ -32,7 +32,8 @@ pub fn detect(law: &Law, derivation: &Derivation) -> Structure {
         })
     });
     let fibres = fibre_constants(law, derivation.kernel("material"));
-    let uses_fibres = [derivation.kernel("energy"), force, dforce].iter().any(|kernel| {
+    let damping = derivation.is_dissipative().then(|| derivation.kernel("damping"));
+    let uses_fibres = [derivation.kernel("energy"), force, dforce].into_iter().chain(damping).any(|kernel| {
         let read = kernel.ir().values.iter().filter_map(|d| match d.op {
             Op::Input(Input::Constants, k) => Some(k as usize),
             _ => None,

@@ -3,7 +3,7 @@
 //! The cases are the files of `law_errors/`: `==== KIND`, a text, `----`, the message. KIND says what the text is:
 //! a `file`, a file but for its doc comment (`documented`), the functions and constants below the struct (`items`),
 //! or the body of the energy, of one parameter mu (`energy`), of mu, kappa and n (`moduli`), or of mu and a fibre direction a
-//! (`fibres`). With UPDATE=1 the messages are written instead of compared, for review.
+//! (`fibres`); or the functions below an energy of mu, beside a viscosity eta (`viscous`). With UPDATE=1 the messages are written instead of compared, for review.
 
 use std::path::{Path, PathBuf};
 
@@ -16,6 +16,10 @@ const MODULI: &str = "struct Parameters {\n    /// Shear modulus.\n    #[unit(\"
                       /// A pure number.\n    #[unit(\"1\")] #[range(1.0, 2.0)] n: f64,\n}\n";
 const FIBRES: &str = "struct Parameters {\n    /// Stiffness.\n    #[unit(\"Pa\")] #[range(0.0, 1e9)] mu: f64,\n    \
                       /// Fibres.\n    a: Direction,\n}\n";
+/// A domain keeps strains from being 0, and no rate.
+const VISCOUS: &str = "#[domain(J > 0.0)]\nstruct Parameters {\n    /// Stiffness.\n    #[unit(\"Pa\")] #[range(0.0, 1e9)] mu: f64,\n    \
+                       /// Viscosity.\n    #[unit(\"Pa s\")] #[range(0.0, 1e9)] eta: f64,\n}\n\
+                       fn energy_density(s: Strain, p: Parameters) -> f64 {\n    p.mu * ddot(s.E, s.E)\n}\n";
 const SIGNATURE: &str = "fn energy_density(s: Strain, p: Parameters) -> f64 {\n    ";
 
 fn folder(name: &str) -> PathBuf {
@@ -56,6 +60,7 @@ fn check(name: &str, text: &str, update: bool) -> (String, usize) {
             "items" => format!("{DOCS}{STRUCT}{text}"),
             "energy" => format!("{DOCS}{STRUCT}{SIGNATURE}{text}\n}}\n"),
             "fibres" => format!("{DOCS}{FIBRES}{SIGNATURE}{text}\n}}\n"),
+            "viscous" => format!("{DOCS}{VISCOUS}{text}\n"),
             "moduli" => format!("{DOCS}{MODULI}{SIGNATURE}{text}\n}}\n"),
             _ => panic!("{name}: unknown kind {kind}"),
         };

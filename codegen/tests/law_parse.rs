@@ -38,6 +38,7 @@ fn scalar(law: &Law, node: &Scalar) -> String {
             format!("[{} > {} ? {} : {}]", s(left), s(right), s(then), s(otherwise))
         }
         ScalarNode::Named(name, value) => format!("{name}:={}", s(value)),
+        ScalarNode::Rate(a) => format!("{}'", s(a)),
     }
 }
 
@@ -51,6 +52,7 @@ fn tensor(law: &Law, node: &Tensor) -> String {
         TensorNode::Add(a, b) => format!("({} + {})", t(a), t(b)),
         TensorNode::Sub(a, b) => format!("({} - {})", t(a), t(b)),
         TensorNode::Scale(s, a) => format!("{}{}", scalar(law, s), t(a)),
+        TensorNode::Rate(a) => format!("{}'", t(a)),
     }
 }
 
@@ -114,6 +116,39 @@ fn tensors_and_their_functions() {
         "(mu * ddot((E - (tr(E) / 3)1), (E - (tr(E) / 3)1)))",
     );
     check_expression("p.mu * tr(s.C * s.J + s.E / 2.0 - -s.C)", "(mu * tr(((JC + (1 / 2)E) - -1C)))");
+}
+
+/// A file with an energy of mu and a, and the dissipation of eta, a rate w and a.
+fn check_dissipation(dissipation: &str, expected: &str) {
+    let mut fields = String::new();
+    for (name, unit) in [("mu", "Pa"), ("eta", "Pa s"), ("w", "1/s")] {
+        if name == "mu" || dissipation.contains(&format!("p.{name}")) {
+            fields += &format!("/// A constant.\n#[unit(\"{unit}\")] #[range(0.0, 1e9)] {name}: f64,\n");
+        }
+    }
+    let text = format!(
+        "//! Test.\n#[domain(J > 0.0)]\nstruct Parameters {{\n{fields}/// Fibres.\na: Direction,\n}}\n\
+         fn energy_density(s: Strain, p: Parameters) -> f64 {{ p.mu * s.I4(p.a) }}\n\
+         fn square(r: StrainRate) -> f64 {{ ddot(r.E, r.C) }}\n\
+         fn dissipation_density(s: Strain, r: StrainRate, p: Parameters) -> f64 {{ {dissipation} }}\n"
+    );
+    let law = parse("laws/test.rs", &text);
+    assert_eq!(scalar(&law, law.dissipation.as_ref().expect("a dissipation")), expected, "{dissipation}");
+}
+
+#[test]
+fn dissipations_take_rates() {
+    check_dissipation("p.eta * square(r) / s.J", "((eta * ddot(E', C')) / J)");
+    check_dissipation("p.eta * (square(r) + r.J.powi(2))", "(eta * (ddot(E', C') + J'^2))");
+    check_dissipation(
+        "p.eta * square(r) + p.eta * r.I4(p.a) * r.stretch_sum(2.0) * tr(s.E)",
+        "((eta * ddot(E', C')) + (((eta * I4(a)') * stretches^2') * tr(E)))",
+    );
+    // Positive at every rate, and so also where a body is at rest.
+    check_dissipation(
+        "p.eta * p.w.powi(2) * sqrt(1.0 + square(r).powi(2) / p.w.powi(4))",
+        "((eta * w^2) * sqrt((1 + (ddot(E', C')^2 / w^4))))",
+    );
 }
 
 #[test]

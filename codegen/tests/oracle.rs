@@ -62,7 +62,8 @@ pub fn oracle(strain: Strain, parameters: &[f64]) -> f64 {
 
 #[test]
 fn a_table_names_every_law() {
-    let text = table(&["a", "b"]).expect("Rust");
+    let text = table(&["a", "b"], &["b"]).expect("Rust");
+    assert!(text.contains("&[(\"b\", b::dissipation_oracle)]"), "{text}");
     assert!(text.contains("&[(\"a\", a::oracle), (\"b\", b::oracle)]"), "{text}");
     assert!(text.contains("\"/oracle/a.rs\""), "{text}");
 }

@@ -33,7 +33,7 @@ pub struct Batch<'a, R> {
 }
 
 impl<'a, R: Real> Batch<'a, R> {
-    fn constants(&self, e: usize) -> &'a [R] {
+    pub(crate) fn constants(&self, e: usize) -> &'a [R] {
         &self.constants[e * self.stride..e * self.stride + self.count]
     }
 
@@ -62,14 +62,14 @@ pub type DForceKernel<R> = fn(&Batch<R>, &[[R; 3]], &[[R; 3]], &mut [[[R; 3]; NO
 pub type CauchyKernel<R> = fn(&Batch<R>, &[[R; 3]], &mut [[R; 9]]);
 
 #[inline(always)]
-fn gather<R: Real>(batch: &Batch<R>, e: usize, u: &[[R; 3]]) -> [R; 9] {
+pub(crate) fn gather<R: Real>(batch: &Batch<R>, e: usize, u: &[[R; 3]]) -> [R; 9] {
     let [a, b, c, d] = batch.nodes[e].map(|n| u[n as usize]);
     let nodal = [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2], d[0], d[1], d[2]];
     gradient(&nodal, &batch.rest[e].shape_gradients)
 }
 
 #[inline(always)]
-fn scatter<R: Real>(batch: &Batch<R>, e: usize, stress: &[R; 9], slots: &mut [[R; 3]; NODES]) {
+pub(crate) fn scatter<R: Real>(batch: &Batch<R>, e: usize, stress: &[R; 9], slots: &mut [[R; 3]; NODES]) {
     let rest = &batch.rest[e];
     let f = contract(stress, &rest.shape_gradients, rest.volume);
     for (node, slot) in slots.iter_mut().enumerate() {

@@ -1,8 +1,9 @@
 //! What generated laws implement, and how a runtime meets them without knowing their types.
 
 use crate::batch;
+use crate::damping::{DampingEntry, Dissipative};
 use crate::real::Real;
-use crate::shader::LawShaders;
+use crate::shader::{DampingShaders, LawShaders};
 
 /// A constitutive law: point kernels generated from its strain energy density W.
 ///
@@ -174,13 +175,21 @@ pub struct LawEntry {
     pub f64: fn() -> BatchKernels<f64>,
     /// The element passes as WGSL, in single precision.
     pub shaders: &'static LawShaders,
+    /// Its damping, if it has a dissipation.
+    pub damping: Option<DampingEntry>,
 }
 
 impl LawEntry {
     /// The entry of a law.
     pub const fn new<L: Law>(info: &'static LawInfo, source: &'static LawSource, shaders: &'static LawShaders) -> Self {
         let (f32, f64) = (BatchKernels::<f32>::of::<L>, BatchKernels::<f64>::of::<L>);
-        Self { info, source, material: L::material, f32, f64, shaders }
+        Self { info, source, material: L::material, f32, f64, shaders, damping: None }
+    }
+
+    /// The entry with the law's damping; `linear` says whether its differential does not depend on the rate.
+    pub const fn with_damping<L: Dissipative>(mut self, linear: bool, shaders: &'static DampingShaders) -> Self {
+        self.damping = Some(DampingEntry::new::<L>(linear, shaders));
+        self
     }
 
     /// The constants of a material, checked for length only.

@@ -8,10 +8,12 @@
 extern crate self as tensormass_kernels;
 
 pub mod batch;
+pub mod damping;
 mod law;
 mod real;
 pub mod shader;
 
+pub use damping::{DampingEntry, DampingKernels, Dissipative};
 pub use law::{BatchKernels, Law, LawEntry, LawInfo, LawSource, Operations, ParameterInfo, Structure};
 pub use real::Real;
 // Generated text computes constants in it.

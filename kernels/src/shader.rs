@@ -20,6 +20,8 @@ pub enum Binding {
     Constants,
     /// Vector: displacement.
     Displacement,
+    /// Vector: velocity.
+    Velocity,
     /// Vector: the direction of a differential.
     Increment,
     /// `array<vec4<f32>>`: partial forces; the slots of one node follow each other.
@@ -85,4 +87,15 @@ pub struct LawShaders {
     pub diagonal: Shader,
     /// Cauchy stress of each element.
     pub cauchy: Shader,
+}
+
+/// The element passes of a law's damping on linear tetrahedra.
+#[derive(Debug, Clone, Copy)]
+pub struct DampingShaders {
+    /// Nodal damping forces of each element into its slots.
+    pub damping: Shader,
+    /// Their differentials by the velocity into the slots.
+    pub ddamping: Shader,
+    /// The diagonal of minus that differential at each element's nodes into its slots.
+    pub diagonal: Shader,
 }

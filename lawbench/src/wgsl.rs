@@ -174,6 +174,7 @@ mod gpu {
             motions: vec![],
             loads: vec![],
             mass_damping: 0.0,
+            stiffness_damping: 0.0,
             diameter: 1.0,
             volume: count as f64,
         }
@@ -195,7 +196,8 @@ mod gpu {
         info.name = leaked(subject.name());
         info.domain = subject.law.domain.as_ref().map(|d| leaked(&d.text));
         info.constants = Box::leak(vec![""; subject.derivation.constants.len()].into_boxed_slice());
-        Box::leak(Box::new(LawEntry { info: Box::leak(Box::new(info)), shaders: Box::leak(Box::new(shaders)), ..like }))
+        let (info, shaders) = (Box::leak(Box::new(info)), Box::leak(Box::new(shaders)));
+        Box::leak(Box::new(LawEntry { info, shaders, damping: None, ..like }))
     }
 
     fn leaked(text: &str) -> &'static str {
@@ -216,6 +218,7 @@ mod gpu {
             B::Rest => Binding::Rest,
             B::Constants => Binding::Constants,
             B::Displacement => Binding::Displacement,
+            B::Velocity => Binding::Velocity,
             B::Increment => Binding::Increment,
             B::Slots => Binding::Slots,
             B::SlotIndex => Binding::SlotIndex,

@@ -171,13 +171,29 @@ pub struct Counts {
     pub bytes_read: u64,
 }
 
-/// A = mass M + stiffness K at the state to which a field is prepared; M is diagonal.
+/// A = mass M + stiffness K + damping, K at the state to which a field is prepared; M is diagonal.
 pub struct Operator<'a, B: Backend> {
     /// Lumped masses, one entry a component.
     pub masses: &'a B::Vector,
     /// Factor m of M.
     pub mass: f64,
     /// Factor k of K.
+    pub stiffness: f64,
+    /// What damping adds, if there is any.
+    pub damping: Option<Damping<'a, B>>,
+}
+
+/// The part of an operator that is damping: viscosity C + stiffness K, both at a state of their own.
+///
+/// C = -df/dv of the laws' dissipations. Implicit steps take damping at the displacement with which they begin.
+pub struct Damping<'a, B: Backend> {
+    /// Displacement.
+    pub u: &'a B::Vector,
+    /// Velocity.
+    pub v: &'a B::Vector,
+    /// Factor of C; 0 where no law has a dissipation.
+    pub viscosity: f64,
+    /// Factor of K at u; 0 where there is no Rayleigh damping, or [`Operator::stiffness`] has it.
     pub stiffness: f64,
 }
 
@@ -187,6 +203,14 @@ impl<B: Backend> Operator<'_, B> {
         backend.clear(y);
         // add_dforce adds -K x.
         field.add_dforce(backend, x, -self.stiffness, y);
+        if let Some(damping) = &self.damping {
+            if damping.viscosity != 0.0 {
+                field.add_ddamping(backend, [damping.u, damping.v], x, -damping.viscosity, y);
+            }
+            if damping.stiffness != 0.0 {
+                field.add_dforce_at(backend, damping.u, x, -damping.stiffness, y);
+            }
+        }
         if self.mass != 0.0 {
             backend.multiply_add(self.mass, self.masses, x, y);
         }
@@ -197,11 +221,25 @@ impl<B: Backend> Operator<'_, B> {
     pub fn diagonal(&self, backend: &B, field: &mut impl ForceField<B>, d: &mut B::Vector) {
         backend.clear(d);
         field.add_diagonal(backend, self.stiffness, d);
+        self.damping_diagonal(backend, field, d);
         backend.axpy(self.mass, self.masses, d);
     }
 }
 
-/// Forces that derive from a potential: the elements of a body.
+impl<B: Backend> Operator<'_, B> {
+    /// d += the diagonal of the part that is damping.
+    pub fn damping_diagonal(&self, backend: &B, field: &mut impl ForceField<B>, d: &mut B::Vector) {
+        let Some(damping) = &self.damping else { return };
+        if damping.viscosity != 0.0 {
+            field.add_damping_diagonal(backend, [damping.u, damping.v], damping.viscosity, d);
+        }
+        if damping.stiffness != 0.0 {
+            field.add_diagonal_at(backend, damping.u, damping.stiffness, d);
+        }
+    }
+}
+
+/// Forces that derive from a potential, and those of damping: the elements of a body.
 ///
 /// K is the tangent stiffness, K = -df/du at the state given to [`ForceField::prepare`].
 pub trait ForceField<B: Backend> {
@@ -223,6 +261,16 @@ pub trait ForceField<B: Backend> {
     fn add_dforce(&mut self, backend: &B, du: &B::Vector, factor: f64, df: &mut B::Vector);
     /// d += factor times the diagonal of K.
     fn add_diagonal(&mut self, backend: &B, factor: f64, d: &mut B::Vector);
+    /// As [`ForceField::add_dforce`] with K at displacement u, whatever was prepared.
+    fn add_dforce_at(&mut self, backend: &B, u: &B::Vector, du: &B::Vector, factor: f64, df: &mut B::Vector);
+    /// As [`ForceField::add_diagonal`] with K at displacement u, whatever was prepared.
+    fn add_diagonal_at(&mut self, backend: &B, u: &B::Vector, factor: f64, d: &mut B::Vector);
+    /// f += factor times the damping forces of the laws' dissipations at \[displacement, velocity\].
+    fn add_damping(&mut self, backend: &B, at: [&B::Vector; 2], factor: f64, f: &mut B::Vector);
+    /// df += factor times their differential by the velocity in the direction dv, that is factor times (-C dv).
+    fn add_ddamping(&mut self, backend: &B, at: [&B::Vector; 2], dv: &B::Vector, factor: f64, df: &mut B::Vector);
+    /// d += factor times the diagonal of C.
+    fn add_damping_diagonal(&mut self, backend: &B, at: [&B::Vector; 2], factor: f64, d: &mut B::Vector);
     /// y = A x, constrained components set to 0, and the sum of x_i y_i for the next update.
     fn product(
         &mut self,

@@ -61,6 +61,8 @@ pub struct Body {
     pub loads: Vec<Load>,
     /// Mass-proportional damping coefficient alpha.
     pub mass_damping: f64,
+    /// Stiffness-proportional damping coefficient beta.
+    pub stiffness_damping: f64,
     /// The length of the bounding box's diagonal at rest.
     pub diameter: f64,
     /// Volume at rest.
@@ -73,9 +75,19 @@ impl Body {
         self.motions.iter().map(|m| m.at(time)).collect()
     }
 
-    /// Whether every law is linear.
+    /// Whether every law is linear, in the strain and in its rate.
     pub fn is_linear(&self) -> bool {
+        self.is_elastically_linear() && self.batches.iter().all(|b| b.law.damping.is_none_or(|d| d.linear))
+    }
+
+    /// Whether every law's stress without damping is linear.
+    pub fn is_elastically_linear(&self) -> bool {
         self.batches.iter().all(|b| b.law.info.structure.linear)
+    }
+
+    /// Whether a law has a dissipation.
+    pub fn is_viscous(&self) -> bool {
+        self.batches.iter().any(|b| b.law.damping.is_some())
     }
 }
 

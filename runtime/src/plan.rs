@@ -1,7 +1,7 @@
 //! What a scene will compute, and what it leaves out: laws, kernels, passes, memory.
 
 use serde_json::{Value, json};
-use tensormass_kernels::LawInfo;
+use tensormass_kernels::{LawEntry, LawInfo};
 
 use crate::mesh::Quality;
 use crate::model::Model;
@@ -76,10 +76,23 @@ impl Plan {
             Integrator::ImplicitEuler | Integrator::Static => true,
             Integrator::SemiImplicitEuler | Integrator::CentralDifference => false,
         };
-        let laws =
-            model.body.batches.iter().map(|b| law(b.law.info, b.elements.len(), b.per_element, implicit)).collect();
+        let moves = scene.solver.integrator != Integrator::Static;
+        // Static equilibrium has no damping.
+        let viscous = moves && model.body.is_viscous();
+        let proportional = moves && model.body.stiffness_damping > 0.0;
+        let laws = model
+            .body
+            .batches
+            .iter()
+            .map(|b| {
+                let mut law = law(b.law.info, b.elements.len(), b.per_element, implicit, proportional);
+                law.kernels
+                    .extend(damping_kernels(b.law).filter(|(name, _)| viscous && (implicit || *name == "damping")));
+                law
+            })
+            .collect();
         let (nodes, elements) = (model.body.masses.len(), model.body.elements.len());
-        let vectors = if implicit { 20 } else { 6 };
+        let vectors = if implicit { 20 + 2 * usize::from(viscous || proportional) } else { 6 };
         let constants: usize = model.body.batches.iter().map(|b| b.constants.len()).sum();
         let with_domain = model.body.batches.iter().filter(|b| b.law.info.domain.is_some());
         let margins: usize = with_domain.map(|b| b.elements.len()).sum();
@@ -113,8 +126,17 @@ impl Plan {
         if layout == Layout::Gpu && margins > 0 {
             passes.push("elements: count of those outside their law's domain");
         }
+        if viscous {
+            passes.push("elements: damping forces, nodes: sum of slots");
+        }
+        if proportional && !implicit {
+            passes.push("elements: partial force differentials of the velocity, nodes: sum of slots");
+        }
         if implicit {
             passes.push("elements: diagonal");
+            if viscous {
+                passes.push("elements: diagonal of damping, nodes: sum of slots");
+            }
             match layout {
                 Layout::Cpu => passes.push("CG: elements: partial force differentials, nodes: sum, vectors"),
                 Layout::Gpu => passes.extend([
@@ -125,6 +147,15 @@ impl Plan {
                     "CG iteration 5: turn, and whether to stop",
                     "CG iteration 6: nodes: next direction",
                 ]),
+            }
+            if viscous {
+                passes.push("CG: elements: partial differentials of damping forces, nodes: product");
+            }
+            // The first iteration's tangent is that of the beginning of the step, which is Rayleigh's.
+            if proportional && scene.solver.newton.max_iterations > 1 && !model.body.is_elastically_linear() {
+                passes.push(
+                    "CG after the first Newton iteration: elements: differentials of stiffness damping, nodes: product",
+                );
             }
         }
         passes.push("nodes: update of the state");
@@ -165,12 +196,27 @@ impl Plan {
     }
 }
 
-fn law(info: &'static LawInfo, elements: usize, per_element: bool, implicit: bool) -> PlannedLaw {
+/// The kernels of a law's damping, each with its operations an element.
+fn damping_kernels(law: &LawEntry) -> impl Iterator<Item = (&'static str, u32)> {
+    let (info, linear) = (law.info, law.damping.map(|damping| damping.linear));
+    let point = |name: &str| info.operations.iter().find(|o| o.kernel == name).map_or(0, |o| o.arithmetic());
+    let gathers = if linear == Some(true) { 2 } else { 3 };
+    let kernels = [
+        ("damping", 2 * GRADIENT_OPERATIONS + point("damping") + CONTRACT_OPERATIONS),
+        ("ddamping", gathers * GRADIENT_OPERATIONS + point("ddamping") + CONTRACT_OPERATIONS),
+        ("damping_diagonal", (gathers - 1) * GRADIENT_OPERATIONS + 4 * point("damping_diagonal")),
+    ];
+    kernels.into_iter().filter(move |_| linear.is_some())
+}
+
+fn law(info: &'static LawInfo, elements: usize, per_element: bool, implicit: bool, proportional: bool) -> PlannedLaw {
     let point = |name: &str| info.operations.iter().find(|o| o.kernel == name).map_or(0, |o| o.arithmetic());
     let gathers = if info.structure.linear { 1 } else { 2 };
     let mut kernels = vec![("force", GRADIENT_OPERATIONS + point("force") + CONTRACT_OPERATIONS)];
-    if implicit {
+    if implicit || proportional {
         kernels.push(("dforce", gathers * GRADIENT_OPERATIONS + point("dforce") + CONTRACT_OPERATIONS));
+    }
+    if implicit {
         kernels.push(("diagonal", GRADIENT_OPERATIONS + 4 * point("diagonal")));
     }
     PlannedLaw { info, elements, per_element, kernels }
@@ -184,6 +230,15 @@ fn scope(scene: &Scene, model: &Model, implicit: bool) -> (Vec<String>, Vec<Stri
     let inertia = scene.solver.integrator != Integrator::Static;
     say(inertia, "inertia (lumped masses)".into(), "inertia: static equilibrium");
     say(scene.solver.mass_damping > 0.0 && inertia, "mass damping".into(), "damping: solver.mass_damping is 0");
+    say(
+        scene.solver.stiffness_damping > 0.0 && inertia,
+        "stiffness damping".into(),
+        "stiffness damping: solver.stiffness_damping is 0",
+    );
+    let viscous = model.body.is_viscous();
+    let no_viscosity =
+        if viscous { "viscosity: nothing moves in statics" } else { "viscosity: no law has a dissipation" };
+    say(viscous && inertia, "viscosity (dissipations of laws)".into(), no_viscosity);
     say(implicit, "tangent stiffness".into(), "tangent stiffness: the integrator is explicit");
     let large = model.body.batches.iter().any(|b| !b.law.info.structure.linear);
     say(large, "large deformation".into(), "large deformation: every law is linear, rotations are not modelled");

@@ -4,6 +4,11 @@
 //! M^-1 K. Each element's own largest eigenvalue bounds it from above (Irons and Treharne 1971), which gives a safe
 //! step; a Krylov power iteration on the assembled operator finds it. The length over wave speed of Li et al. 2014,
 //! eqs. (9), (10), is neither: for lumped tetrahedra it can lie above the limit.
+//!
+//! With damping forces -C v of the last known velocity both schemes are stable while 4 M - 2 h C - h^2 K is positive: of a
+//! motion with k = omega^2 = x.Kx / x.Mx and c = x.Cx / x.Mx, for h < (sqrt(c^2 + 4 k) - c) / k, which with c = 2 xi omega is
+//! 2 / omega (sqrt(1 + xi^2) - xi) (Belytschko, Liu & Moran, Nonlinear Finite Elements for Continua and
+//! Structures, sec. 6.2).
 
 use std::collections::HashMap;
 
@@ -24,20 +29,27 @@ pub struct StepLimits {
     pub power: f64,
 }
 
-fn step_of(eigenvalue: f64) -> f64 {
-    if eigenvalue > 0.0 { 2.0 / eigenvalue.sqrt() } else { f64::INFINITY }
+/// The critical step of a motion with these k and c: the limit falls with both.
+fn step_of(k: f64, c: f64) -> f64 {
+    match (k > 0.0, c > 0.0) {
+        (true, false) => 2.0 / k.sqrt(),
+        (_, true) => 4.0 / ((c * c + 4.0 * k.max(0.0)).sqrt() + c),
+        (false, false) => f64::INFINITY,
+    }
 }
 
 /// The safe step: 2 / sqrt of the largest eigenvalue of any element's M_e^-1 K_e at rest.
 ///
 /// The non-zero eigenvalues of M_e^-1 K_e are those of the 9 x 9 matrix H^1/2 (d2W/dG2) H^1/2 with
-/// H = (4 / rho) sum_a grad Lambda_a (x) grad Lambda_a. Congruent elements of one material are computed once.
+/// H = (4 / rho) sum_a grad Lambda_a (x) grad Lambda_a. Congruent elements of one material are computed once. Damping
+/// counts with its own largest eigenvalue, at rest.
 pub fn element_limit(body: &Body) -> f64 {
     let mut known: HashMap<(Vec<u64>, [u64; 11]), f64> = HashMap::new();
-    let mut largest = 0.0_f64;
+    let mut least = f64::INFINITY;
     for batch in &body.batches {
         let count = batch.law.info.constants.len();
         let kernels = <f64 as Precision>::kernels(batch.law);
+        let damping = <f64 as Precision>::damping_kernels(batch.law);
         for (i, &e) in batch.elements.iter().enumerate() {
             let rest = &body.rest[e as usize];
             let start = if batch.per_element { i * count } else { 0 };
@@ -49,17 +61,30 @@ pub fn element_limit(body: &Body) -> f64 {
             }
             shape[10] = std::ptr::from_ref(batch.law) as u64;
             let material = constants.iter().map(|c| c.to_bits()).collect();
-            let value = *known
-                .entry((material, shape))
-                .or_insert_with(|| element_eigenvalue(kernels.dforce, constants, rest, density));
-            largest = largest.max(value);
+            let value = *known.entry((material, shape)).or_insert_with(|| {
+                let still = [[0.0; 3]; 4];
+                let k = element_eigenvalue(|b, x, y| (kernels.dforce)(b, &still, x, y), constants, rest, density);
+                let viscous = damping.map_or(0.0, |damping| {
+                    let product =
+                        |b: &Batch<f64>, x: &Nodal, y: &mut Slots| (damping.ddamping)(b, &still, &still, x, y);
+                    element_eigenvalue(product, constants, rest, density)
+                });
+                step_of(k, viscous + body.stiffness_damping * k)
+            });
+            least = least.min(value);
         }
     }
-    step_of(largest)
+    least
 }
 
+/// A vector at the nodes of one element.
+type Nodal = [[f64; 3]; 4];
+/// The slots of one element.
+type Slots = [Nodal; 1];
+
+/// The largest eigenvalue of an element's M_e^-1 K_e, where `product` is -K_e du.
 fn element_eigenvalue(
-    dforce: tensormass_kernels::batch::DForceKernel<f64>,
+    product: impl Fn(&Batch<f64>, &Nodal, &mut Slots),
     constants: &[f64],
     rest: &RestElement<f64>,
     density: f64,
@@ -74,13 +99,12 @@ fn element_eigenvalue(
     let unit = RestElement { shape_gradients: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], volume: 1.0 };
     let (nodes, units) = ([[0, 1, 2, 3]], [unit]);
     let batch = Batch { nodes: &nodes, rest: &units, constants, stride: 0, count: constants.len() };
-    let rest_state = [[0.0; 3]; 4];
     let mut tangent = SMatrix::<f64, 9, 9>::zeros();
     for column in 0..9 {
         let mut du = [[0.0; 3]; 4];
         du[column % 3 + 1][column / 3] = 1.0;
         let mut df = [[[0.0; 3]; 4]];
-        dforce(&batch, &rest_state, &du, &mut df);
+        product(&batch, &du, &mut df);
         for line in 0..9 {
             tangent[(line, column)] = -df[0][line % 3 + 1][line / 3];
         }
@@ -101,30 +125,77 @@ fn element_eigenvalue(
 /// Iterations of the power iteration, at most.
 const ITERATIONS: usize = 400;
 
-/// The limit itself: the largest eigenvalue of M^-1 K on the free components by a Lanczos (Krylov power) iteration from
-/// a fixed start, at displacement u; the iteration ends when ten further products change the step by less than 1e-4.
+/// Corrections of the limit where laws have a dissipation.
+const CORRECTIONS: usize = 6;
+
+/// The limit itself, at displacement u and velocity 0, by a Lanczos (Krylov power) iteration from a fixed start for the
+/// largest eigenvalue of M^-1 K on the free components.
+///
+/// With viscosity the limit is the root of lambda(h) = 4, where lambda is the largest eigenvalue of
+/// M^-1 ((h^2 + 2 beta h) K + 2 h C): convex in h, so that chords approach the root from both sides.
 pub fn power_limit<B: Backend, F: ForceField<B>>(system: &mut System<B, F>, u: &B::Vector) -> f64 {
+    let beta = system.body.stiffness_damping;
+    let k = eigenvalue(system, u, 1.0, 0.0);
+    if !system.body.is_viscous() {
+        return step_of(k, beta * k);
+    }
+    // As if the stiffest motion were the most viscous one: not above the limit.
+    let c = eigenvalue(system, u, 0.0, 1.0);
+    let mut low = step_of(k, c + beta * k);
+    if !low.is_finite() {
+        return low;
+    }
+    let mut excess = |h: f64| eigenvalue(system, u, h * (h + 2.0 * beta), 2.0 * h) - 4.0;
+    let mut of_low = excess(low);
+    // The chord from (0, -4), where the function is -4, meets 0 at or beyond the root.
+    let mut high = low * 4.0 / (4.0 + of_low);
+    for _ in 0..CORRECTIONS {
+        if high - low <= 1e-3 * high {
+            break;
+        }
+        let of_high = excess(high);
+        let root = low - of_low * (high - low) / (of_high - of_low);
+        (low, of_low) = (root, excess(root));
+        high = (low * 4.0 / (4.0 + of_low)).min(high);
+    }
+    low
+}
+
+/// The largest eigenvalue of M^-1 (stiffness K + viscosity C) on the free components at displacement u and velocity 0;
+/// the iteration ends when ten further products change the step by less than 1e-4.
+fn eigenvalue<B: Backend, F: ForceField<B>>(
+    system: &mut System<B, F>,
+    u: &B::Vector,
+    stiffness: f64,
+    viscosity: f64,
+) -> f64 {
     let nodes = system.body.masses.len();
     let roots: Vec<[f64; 3]> = system.body.masses.iter().map(|m| [m.sqrt(); 3]).collect();
     let backend = &system.backend;
     let field = &mut system.field;
     field.prepare(backend, u);
     let root = backend.upload(&roots);
+    let still = (viscosity != 0.0).then(|| backend.zeros());
     let mut q = backend.upload(&start_vector(nodes));
     backend.project(&mut q);
     let norm = backend.dot(&q, &q).sqrt();
     if norm == 0.0 {
-        return f64::INFINITY;
+        return 0.0;
     }
     backend.scale(1.0 / norm, &mut q);
     let (mut previous, mut w, mut scaled) = (backend.zeros(), backend.zeros(), backend.zeros());
     let (mut alphas, mut betas): (Vec<f64>, Vec<f64>) = (vec![], vec![]);
     let mut last = 0.0;
     for k in 1..=ITERATIONS {
-        // w = M^-1/2 K M^-1/2 q, symmetric.
+        // w = M^-1/2 A M^-1/2 q, symmetric.
         backend.divide(&q, &root, &mut scaled);
         backend.clear(&mut w);
-        field.add_dforce(backend, &scaled, -1.0, &mut w);
+        if stiffness != 0.0 {
+            field.add_dforce(backend, &scaled, -stiffness, &mut w);
+        }
+        if let Some(still) = &still {
+            field.add_ddamping(backend, [u, still], &scaled, -viscosity, &mut w);
+        }
         backend.project(&mut w);
         backend.divide(&w, &root, &mut scaled);
         std::mem::swap(&mut w, &mut scaled);
@@ -138,7 +209,7 @@ pub fn power_limit<B: Backend, F: ForceField<B>>(system: &mut System<B, F>, u: &
         if k % 10 == 0 || beta <= 1e-12 * alpha.abs() {
             let value = largest_eigenvalue(&alphas, &betas);
             if (value - last).abs() <= 2e-4 * value.abs() || beta <= 1e-12 * alpha.abs() {
-                return step_of(value);
+                return value;
             }
             last = value;
         }
@@ -147,7 +218,7 @@ pub fn power_limit<B: Backend, F: ForceField<B>>(system: &mut System<B, F>, u: &
         backend.scale(1.0 / beta, &mut w);
         std::mem::swap(&mut q, &mut w);
     }
-    step_of(last)
+    last
 }
 
 /// Components in [-1, 1] from a fixed sequence: rich in short waves, where the largest eigenvalue lives.

@@ -109,6 +109,16 @@ impl<B: Backend, F: ForceField<B>> System<B, F> {
         Ok(())
     }
 
+    /// f += the elements' damping forces at displacement u and velocity v: those of dissipations, and Rayleigh's -beta K v.
+    pub fn add_damping(&mut self, u: &B::Vector, v: &B::Vector, f: &mut B::Vector) {
+        if self.body.is_viscous() {
+            self.field.add_damping(&self.backend, [u, v], 1.0, f);
+        }
+        if self.body.stiffness_damping != 0.0 {
+            self.field.add_dforce_at(&self.backend, u, v, self.body.stiffness_damping, f);
+        }
+    }
+
     /// Work of the loads against u: minus their potential, 0 at rest.
     pub fn load_work(&self, u: &B::Vector, time: f64) -> f64 {
         let loads = self.body.loads.iter().zip(&self.loads);

@@ -10,20 +10,22 @@ use tensormass_runtime::scene::Scene;
 use tensormass_runtime::simulate::Ending;
 use tensormass_runtime::{LawEntry, laws};
 
-/// A material of the law whose moduli, whatever their names and defaults are, are `stiffness` for 1 MPa.
-fn stiffened(law: &LawEntry, stiffness: f64) -> Vec<f64> {
+/// A material of the law whose moduli, whatever their names and defaults are, are `stiffness` for 1 MPa, and whose times are
+/// `time` for 1 s.
+fn stiffened(law: &LawEntry, stiffness: f64, time: f64) -> Vec<f64> {
     let mut values = parameters(law);
-    let powers = law.info.parameters.iter().flat_map(|p| std::iter::repeat_n(p.dimensions[1], p.len));
-    values.iter_mut().zip(powers).for_each(|(x, power)| *x *= (stiffness / 1e6).powi(power));
+    let powers = law.info.parameters.iter().flat_map(|p| std::iter::repeat_n(p.dimensions, p.len));
+    let factor = |[_, of_stress, of_time]: [i32; 3]| (stiffness / 1e6).powi(of_stress) * time.powi(of_time);
+    values.iter_mut().zip(powers).for_each(|(x, powers)| *x *= factor(powers));
     values
 }
 
 /// Materials for slabs along x, by law and Young's modulus; other parameters are those of any law.
-fn materials(slabs: &[(&str, f64)], length: f64, density: f64) -> String {
+fn materials(slabs: &[(&str, f64)], length: f64, density: f64, time: f64) -> String {
     let count = slabs.len() as f64;
     let one = |(i, (law, stiffness)): (usize, &(&str, f64))| {
         let entry = tensormass_runtime::law(law).expect("a law of this build");
-        let text = table(entry, &stiffened(entry, *stiffness));
+        let text = table(entry, &stiffened(entry, *stiffness, time));
         let (from, to) = (length * i as f64 / count, length * (i + 1) as f64 / count);
         format!(
             "[[material]]\nlaw = \"{law}\"\ndensity = {density:?}\nelements = \"x > {from:?} && x < {to:?}\"\n\
@@ -62,10 +64,10 @@ impl Swing {
         let Swing { length, stress, origin, cells, integrator, precision, threads, steps } = self;
         let slabs: Vec<(&str, f64)> = laws().iter().map(|l| (l.info.name, 1e6 * stress)).collect();
         // Selections by x count from the end.
-        let materials =
-            materials(&slabs, 4.0 * length, 1000.0).replace("x >", "x - xmin >").replace("x <", "x - xmin <");
-        let (size, origin) = ([4.0 * length, *length, *length], origin.map(|x| x * length));
         let time = length / stress.sqrt();
+        let materials =
+            materials(&slabs, 4.0 * length, 1000.0, time).replace("x >", "x - xmin >").replace("x <", "x - xmin <");
+        let (size, origin) = ([4.0 * length, *length, *length], origin.map(|x| x * length));
         let step = time * if *integrator == "implicit-euler" { 0.01 } else { 1e-3 };
         let text = format!(
             r#"
@@ -194,7 +196,7 @@ fn forces(model: &Model, u: &[[f64; 3]]) -> (Vec<[f64; 3]>, Vec<f64>, Vec<[f64; 
 fn check_slabs(slabs: &[(&str, f64)]) {
     let text = |slabs: &[(&str, f64)]| {
         let (materials, solver) =
-            (materials(slabs, 4.0, 1000.0), "integrator = \"implicit-euler\"\nstep = 1\nduration = 1");
+            (materials(slabs, 4.0, 1000.0, 1.0), "integrator = \"implicit-euler\"\nstep = 1\nduration = 1");
         format!("{materials}\n[mesh]\nbeam = {{ size = [4, 1, 1], cells = [8, 2, 2] }}\n[solver]\n{solver}\n")
     };
     let of = |slabs: &[(&str, f64)]| build(&scene::<&str>(&text(slabs), &[])).unwrap_or_else(|e| panic!("{e}"));
@@ -220,7 +222,7 @@ fn check_slabs(slabs: &[(&str, f64)]) {
         // The forces of this slab: a body of its elements' batch only.
         let entry = tensormass_runtime::law(slab.0).expect("a law");
         let mesh = beam([4.0, 1.0, 1.0], [8, 2, 2], [0.0; 3]).expect("a beam");
-        let own = stiffened(entry, slab.1);
+        let own = stiffened(entry, slab.1, 1.0);
         let mut body = body(&mesh, entry, &own, &[]);
         let place = |e: &u32| {
             let corners = mesh.corners(tensormass_runtime::mesh::ElementId(*e));

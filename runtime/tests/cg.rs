@@ -38,7 +38,7 @@ fn solve<R: Precision>(system: &mut Cpu<R>, u: &[[f64; 3]], mass: f64, limits: C
     let (b, mut x) = (vector(1e5), vector(0.1));
     let u = backend.upload(u);
     system.field.prepare(backend, &u);
-    let operator = Operator { masses: &system.masses, mass, stiffness: 1.0 };
+    let operator = Operator { masses: &system.masses, mass, stiffness: 1.0, damping: None };
     let mut d = backend.zeros();
     operator.diagonal(backend, &mut system.field, &mut d);
     backend.make_positive(&mut d);
@@ -92,7 +92,7 @@ fn nothing_to_do_takes_no_iteration() {
     let mut system = clamped::<f64>(0);
     let rest = system.backend.zeros();
     system.field.prepare(&system.backend, &rest);
-    let operator = Operator { masses: &system.masses, mass: 1.0, stiffness: 1.0 };
+    let operator = Operator { masses: &system.masses, mass: 1.0, stiffness: 1.0, damping: None };
     let (b, ones, mut x) = (system.backend.zeros(), vec![[1.0; 3]; rest.len()], system.backend.zeros());
     let limits = CgLimits { tolerance: 1e-6, max_iterations: 10 };
     let mut cg = ConjugateGradient::new(&system.backend);

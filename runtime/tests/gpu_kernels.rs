@@ -51,6 +51,9 @@ impl<B: Backend, F: ForceField<B>> On<B, F> {
         match kernel {
             Kernel::Energy => return field.element_energies(backend, &u).expect("inside the domain"),
             Kernel::Cauchy => return field.cauchy(backend, &u).into_flattened(),
+            Kernel::Damping => field.add_damping(backend, [&u, &du], factor, &mut sum),
+            Kernel::DDamping => field.add_ddamping(backend, [&u, &du], &du, factor, &mut sum),
+            Kernel::DampingDiagonal => field.add_damping_diagonal(backend, [&u, &du], factor, &mut sum),
             Kernel::Force => field.add_force(backend, &u, &mut sum).expect("inside the domain"),
             Kernel::DForce => {
                 field.prepare(backend, &u);

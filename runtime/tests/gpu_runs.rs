@@ -6,7 +6,7 @@ mod support;
 use std::sync::Arc;
 
 use support::gpu::test_device;
-use support::{body, done, outcome, parameters, parameters_text, repository, scene};
+use support::{body, done, outcome, parameters, repository, scene, table, viscous};
 use tensormass_runtime::backend::{Backend, Counts, ForceField, Operator};
 use tensormass_runtime::cg::{CgLimits, CgOutcome, ConjugateGradient};
 use tensormass_runtime::device::DeviceError;
@@ -72,7 +72,7 @@ fn bent(law: &tensormass_runtime::LawEntry, solver: &str) -> String {
          component = \"x\"\n[[probe]]\nname = \"energy\"\nkind = \"energy\"\npart = \"total\"\n[[probe]]\n\
          name = \"stress\"\nkind = \"stress\"\ncomponent = \"von_mises\"\nstatistic = \"mean\"\n",
         law.info.name,
-        parameters_text(law)
+        table(law, &viscous(law, 3e3))
     )
 }
 
@@ -83,10 +83,13 @@ fn every_law_with_every_integrator() {
     let Some(gpu) = test_device().map(Arc::new) else { return };
     let implicit = "step = 0.01\nduration = 0.06\ncg = { tolerance = 1e-6, max_iterations = 2000 }";
     let solvers = [
-        "integrator = \"semi-implicit-euler\"\nstep = 5e-4\nduration = 0.06".to_string(),
+        "integrator = \"semi-implicit-euler\"\nstep = 5e-4\nduration = 0.06\nstiffness_damping = 1e-3".to_string(),
         "integrator = \"central-difference\"\nstep = 5e-4\nduration = 0.06\nmass_damping = 2.0".to_string(),
         format!("integrator = \"implicit-euler\"\n{implicit}\nnewton = {{ max_iterations = 1 }}"),
-        format!("integrator = \"implicit-euler\"\n{implicit}\nnewton = {{ tolerance = 1e-5, max_iterations = 20 }}"),
+        format!(
+            "integrator = \"implicit-euler\"\nstiffness_damping = 0.01\n{implicit}\nnewton = {{ tolerance = 1e-5, \
+             max_iterations = 20 }}"
+        ),
         format!("integrator = \"static\"\n{implicit}\nnewton = {{ tolerance = 1e-5, max_iterations = 20 }}"),
     ];
     for law in laws() {
@@ -141,7 +144,7 @@ fn the_solver_reads_once_a_submission() {
             let ones = backend.upload(&vec![[1.0; 3]; body.masses.len()]);
             let rest = backend.zeros();
             field.prepare(&backend, &rest);
-            let operator = Operator { masses: &masses, mass: 0.0, stiffness: 1.0 };
+            let operator = Operator { masses: &masses, mass: 0.0, stiffness: 1.0, damping: None };
             let mut cg = ConjugateGradient::new(&backend);
             let mut solve = |tolerance, max_iterations| {
                 let mut x = backend.zeros();

@@ -199,6 +199,58 @@ impl Strain {
     }
 }
 
+/// The rates of what [`Strain`] has.
+#[derive(Clone, Copy)]
+#[allow(non_snake_case)] // the names of the law language
+pub struct StrainRate {
+    /// The strain that changes.
+    at: Strain,
+    pub eps: Tensor,
+    pub E: Tensor,
+    pub C: Tensor,
+    pub I1: Number,
+    pub I2: Number,
+    pub I3: Number,
+    pub J: Number,
+    pub I1bar: Number,
+    pub I2bar: Number,
+}
+
+impl StrainRate {
+    /// At G, where G changes by `rate`.
+    pub fn of(g: [Number; 9], rate: [Number; 9]) -> Self {
+        let (half, two, three) = (lit(0.5), lit(2.0), lit(3.0));
+        let s = Strain::of(g);
+        let (f, l) = (Tensor(g) + identity(), Tensor(rate));
+        let at = |t: &Tensor, i: usize, j: usize| t.0[3 * i + j];
+        let column = |i: usize, j: usize| {
+            let term = |k: usize| at(&f, k, i) * at(&l, k, j) + at(&l, k, i) * at(&f, k, j);
+            term(0) + term(1) + term(2)
+        };
+        let c = Tensor(std::array::from_fn(|k| column(k / 3, k % 3)));
+        let i1 = tr(c);
+        let i2 = s.I1 * i1 - ddot(s.C, c);
+        // dJ/dt: the determinants with one row of F replaced by that of its rate.
+        let row = |i: usize| det(Tensor(std::array::from_fn(|k| if k / 3 == i { l.0[k] } else { f.0[k] })));
+        let j = row(0) + row(1) + row(2);
+        let share = j / s.J;
+        let square = (s.J * s.J).powf(lit(1.0) / three);
+        let eps = Tensor(std::array::from_fn(|k| half * (rate[k] + rate[3 * (k % 3) + k / 3])));
+        Self {
+            at: s,
+            eps,
+            E: c * half,
+            C: c,
+            I1: i1,
+            I2: i2,
+            I3: two * s.J * j,
+            J: j,
+            I1bar: i1 / square - two / three * s.I1bar * share,
+            I2bar: i2 / (square * square) - lit(4.0) / three * s.I2bar * share,
+        }
+    }
+}
+
 impl Strain {
     /// The sum of the principal stretches to a power that depends on parameters alone.
     pub fn stretch_sum(self, exponent: Number) -> Number {
@@ -222,6 +274,38 @@ impl Strain {
     }
     pub fn I5bar(self, a: Direction) -> Number {
         self.I5(a) / self.I3.powf(lit(2.0) / lit(3.0))
+    }
+}
+
+#[allow(non_snake_case)] // the names of the law language
+impl StrainRate {
+    /// The rate of the sum of the principal stretches to a power: part by part of the rate of C, in which it is linear.
+    pub fn stretch_sum(self, exponent: Number) -> Number {
+        let along = |part: fn(Number) -> Rounded| {
+            let moving = |k: usize| Number { a: part(self.C.0[k]), ..constant(self.at.C.0[k].x) };
+            stretches::trace_of_power(Tensor(std::array::from_fn(moving)), exponent.x * Rounded::exact(0.5)).a
+        };
+        Number { x: along(|n| n.x), a: along(|n| n.a), b: along(|n| n.b), c: along(|n| n.c) }
+    }
+    pub fn I4(self, a: Direction) -> Number {
+        between(a, self.C, a)
+    }
+    pub fn I5(self, a: Direction) -> Number {
+        // Of a . C^2 . a, with the symmetric C and its rate.
+        let [c, rate] = [self.at.C, self.C]
+            .map(|t| [0, 1, 2].map(|i| (0..3).map(|j| t.0[3 * i + j] * a.0[j]).reduce(|x, y| x + y)));
+        (0..3).map(|i| lit(2.0) * c[i].expect("three") * rate[i].expect("three")).reduce(|x, y| x + y).expect("three")
+    }
+    pub fn I8(self, a: Direction, b: Direction) -> Number {
+        between(a, self.C, b)
+    }
+    pub fn I4bar(self, a: Direction) -> Number {
+        let share = self.I3 / self.at.I3;
+        self.I4(a) / self.at.I3.powf(lit(1.0) / lit(3.0)) - share / lit(3.0) * self.at.I4bar(a)
+    }
+    pub fn I5bar(self, a: Direction) -> Number {
+        let share = self.I3 / self.at.I3;
+        self.I5(a) / self.at.I3.powf(lit(2.0) / lit(3.0)) - lit(2.0) * share / lit(3.0) * self.at.I5bar(a)
     }
 }
 

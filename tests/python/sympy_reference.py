@@ -198,8 +198,13 @@ class Law:
                 self.next()
                 name = self.next()
                 if self.accept("("):
-                    function = FIBRES[name] if name in FIBRES else FUNCTIONS[name]
-                    value = function(value, *self.arguments(scope, ")"))
+                    arguments = self.arguments(scope, ")")
+                    if name in FIBRES and "along" in value:
+                        value = sp.diff(FIBRES[name](value["along"], *arguments), T).subs(T, 0)
+                    elif name == "stretch_sum" and "along" in value:
+                        raise NotImplementedError("rates of sums of stretches")
+                    else:
+                        value = (FIBRES[name] if name in FIBRES else FUNCTIONS[name])(value, *arguments)
                 else:
                     value = value[name]
             elif self.accept("["):
@@ -245,6 +250,13 @@ class Law:
     def energy(self, strain, parameters):
         parts = [name for name in self.functions if name.startswith("energy_density")]
         return sum(self.call(name, [strain, parameters]) for name in parts)
+
+    def dissipation(self, strain, rate, parameters):
+        parts = [name for name in self.functions if name.startswith("dissipation_density")]
+        return sum(self.call(name, [strain, rate, parameters]) for name in parts)
+
+    def is_dissipative(self):
+        return any(name.startswith("dissipation_density") for name in self.functions)
 
     def inside(self, strain, parameters):
         if self.domain is None:
@@ -349,6 +361,17 @@ def strain(g):
     }
 
 
+T = sp.symbols("t")
+
+
+def strain_rate(g, rate):
+    """The rates of the strain where G changes by `rate`, as derivatives along a line in time."""
+    along = strain(g + T * rate)
+    rates = {name: sp.diff(value, T).subs(T, 0) for name, value in along.items()}
+    # For the invariants with fibres, which are functions of the strain and not among its values.
+    return {**rates, "along": along}
+
+
 def matrix(numerators, denominator):
     return sp.Matrix(3, 3, [sp.Rational(n, denominator) for n in numerators])
 
@@ -364,6 +387,7 @@ STATES = [
     matrix([-160, 3, 1, -2, 5, 4, 5, 1, -9], 64),
 ]
 DIRECTION = matrix([3, -5, 2, 7, 1, -4, -2, 6, 5], 8)
+RATE = matrix([-2, 7, 4, 1, 3, -6, 5, -1, 8], 16)
 
 
 def near_equal():
@@ -458,6 +482,30 @@ def values(law, parameters, g):
         "P": [decimal(x, scale) for x in p],
         "dP": [decimal(x, scale) for x in dp],
         "cauchy": [decimal(x, scale) for x in cauchy],
+        **damping(law, parameters, g),
+    }
+
+
+def damping(law, parameters, g):
+    """D, P_v and dP_v at one state and the rate RATE, by derivatives in the rate; nothing of a law without damping."""
+    if not law.is_dissipative():
+        return {}
+    still = strain(g)
+    at_rest = law.dissipation(still, strain_rate(g, sp.zeros(3, 3)), parameters)
+    p, dp = [], []
+    for k in range(9):
+        line = RATE + H * DIRECTION
+        line[k] += S
+        first = sp.diff(law.dissipation(still, strain_rate(g, line), parameters), S)
+        p.append(first.subs({S: 0, H: 0}).evalf(45))
+        dp.append(sp.diff(first, H).subs({S: 0, H: 0}).evalf(45))
+    scale = max([abs(x) for x in dp])
+    density = law.dissipation(still, strain_rate(g, RATE), parameters) - at_rest
+    return {
+        "rate": [exact(x) for x in RATE],
+        "D": decimal(sp.sympify(density).evalf(45), scale),
+        "P_v": [decimal(x, scale) for x in p],
+        "dP_v": [decimal(x, scale) for x in dp],
     }
 
 

@@ -17,11 +17,12 @@ pub struct Arguments {
 /// # Errors
 /// The output cannot be written.
 pub fn call(arguments: &Arguments) -> Result<(), Failure> {
-    let laws = tensormass_runtime::laws().iter().map(|law| law.info);
+    let laws = tensormass_runtime::laws().iter();
     if arguments.json {
         return text::print_json(&laws.map(show::json).collect());
     }
     let rows: Vec<Vec<String>> = laws
+        .map(|law| law.info)
         .map(|law| {
             let title = law.docs.lines().next().unwrap_or_default();
             vec![law.name.to_string(), review(law.reviewed).to_string(), title.to_string()]

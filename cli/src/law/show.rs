@@ -1,7 +1,7 @@
 //! `tensormass law show`: all that is known about one law.
 
 use serde_json::{Value, json};
-use tensormass_runtime::{LawInfo, Operations, ParameterInfo};
+use tensormass_runtime::{LawEntry, Operations, ParameterInfo};
 
 use super::{names, review};
 use crate::failure::Failure;
@@ -27,11 +27,12 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
         let remedy = text::suggest(name, &names(), "the laws of this build are");
         return Err(Failure::bad_input(format!("there is no law `{name}`; {remedy}")));
     };
-    if arguments.json { text::print_json(&json(law.info)) } else { text::print(&page(law.info)) }
+    if arguments.json { text::print_json(&json(law)) } else { text::print(&page(law)) }
 }
 
 /// A law as JSON.
-pub fn json(law: &LawInfo) -> Value {
+pub fn json(entry: &LawEntry) -> Value {
+    let law = entry.info;
     json!({
         "name": law.name,
         "docs": law.docs,
@@ -39,6 +40,7 @@ pub fn json(law: &LawInfo) -> Value {
         "hash": format!("{:016x}", law.hash),
         "domain": law.domain,
         "small_strain": law.small_strain,
+        "dissipative": entry.damping.is_some(),
         "parameters": law.parameters.iter().map(parameter_json).collect::<Value>(),
         "constants": law.constants,
         "structure": {
@@ -78,7 +80,13 @@ fn operations_json(o: &Operations) -> Value {
 }
 
 /// A law as a page of text.
-fn page(law: &LawInfo) -> String {
+fn page(entry: &LawEntry) -> String {
+    let law = entry.info;
+    let dissipation = match entry.damping {
+        None => "none",
+        Some(damping) if damping.linear => "yes: damping is linear in the strain rate",
+        Some(_) => "yes",
+    };
     let mut page = format!("{} ({})\n", law.name, review(law.reviewed));
     for line in law.docs.lines() {
         page += &format!("  {}\n", line.trim());
@@ -86,6 +94,7 @@ fn page(law: &LawInfo) -> String {
     let facts = [
         ["domain", law.domain.unwrap_or("everywhere")],
         ["small strain", if law.small_strain { "yes: rotation stresses it" } else { "no" }],
+        ["dissipation", dissipation],
         ["linear", if law.structure.linear { "yes: dP does not depend on G" } else { "no" }],
         ["isotropic", if law.structure.isotropic { "yes" } else { "no" }],
         ["uses J", if law.structure.uses_j { "yes" } else { "no" }],

@@ -12,6 +12,7 @@ use crate::law::ast::{self, Law, Scalar, ScalarNode, Tensor, TensorNode};
 use crate::quantity::{Kind, Quantities, Value};
 
 use super::DeriveError;
+use super::differential::Differential;
 use super::strain::{Base, Direction, Invariant, Strain};
 
 /// A named value with more nodes than this becomes a stage of its own instead of being repeated where it is used.
@@ -30,7 +31,7 @@ pub struct Energy<'a> {
     quantities: &'a mut Quantities,
     strain: &'a mut Strain,
     /// The symbols of the parameters' components, parameter by parameter.
-    parameters: Vec<Vec<Symbol>>,
+    pub parameters: Vec<Vec<Symbol>>,
     known: HashMap<*const ScalarNode, Expr>,
     /// The comparisons of the law's selections.
     pub conditions: Vec<(Expr, Expr)>,
@@ -54,6 +55,16 @@ impl<'a> Energy<'a> {
             }
             parameters.push(components);
         }
+        Self::with(parameters, cas, quantities, strain)
+    }
+
+    /// As [`Energy::new`], with parameters that are registered.
+    pub fn with(
+        parameters: Vec<Vec<Symbol>>,
+        cas: &'a mut Cas,
+        quantities: &'a mut Quantities,
+        strain: &'a mut Strain,
+    ) -> Self {
         let (known, finite) = (HashMap::new(), Base::A);
         Self { cas, quantities, strain, parameters, known, conditions: vec![], isochoric: false, finite }
     }
@@ -127,6 +138,7 @@ impl<'a> Energy<'a> {
                 let value = Value::Select { left, right, then: then?, otherwise: otherwise? };
                 self.quantity("select", value)
             }
+            ScalarNode::Rate(a) => self.rate(a)?,
             ScalarNode::Named(name, value) => {
                 let e = self.scalar(value)?;
                 let e = self.cas.normalize(&e)?;
@@ -139,6 +151,13 @@ impl<'a> Energy<'a> {
                 }
             }
         })
+    }
+
+    /// The rate of an invariant: the sum of its derivatives by the strains and J times their rates.
+    fn rate(&mut self, invariant: &Scalar) -> Result<Expr, DeriveError> {
+        let e = self.scalar(invariant)?;
+        let rates = self.strain.rates(self.cas, self.quantities)?;
+        Ok(Differential::new(self.cas, self.quantities, "rate_", rates, vec![]).of(&e)?)
     }
 
     /// A new quantity: constant if everything that it reads is.
@@ -240,6 +259,13 @@ impl<'a> Energy<'a> {
             TensorNode::C if self.finite == Base::C => single(Base::C, Expr::int(1)),
             TensorNode::E => single(Base::A, Expr::ratio(1, 2)),
             TensorNode::C => Combination { identity: Expr::int(1), ..single(Base::A, Expr::int(1)) },
+            TensorNode::Rate(a) => match &**a {
+                TensorNode::Eps => single(Base::RateEps, Expr::int(1)),
+                TensorNode::E => single(Base::RateA, Expr::ratio(1, 2)),
+                TensorNode::C => single(Base::RateA, Expr::int(1)),
+                // The law language has no rate of anything else.
+                _ => return Err(DeriveError::Unsupported("a rate of what is no strain".into())),
+            },
             TensorNode::Identity => Combination { bases: vec![], identity: Expr::int(1) },
             TensorNode::Add(a, b) => {
                 let (a, b) = (self.tensor(a)?, self.tensor(b)?);

@@ -5,6 +5,7 @@
 //! first, then P = F S + ..; every differential is the sum of partial derivatives times differentials, stage by stage
 //! (a staged tangent), so that no expression grows. The computer algebra system takes every partial derivative.
 
+mod damping;
 mod differential;
 mod energy;
 mod fibre;
@@ -39,6 +40,12 @@ pub enum DeriveError {
     /// The law cannot be split at rest.
     #[error(transparent)]
     Split(#[from] SplitError),
+    /// The dissipation stresses a body whose strain does not change.
+    #[error(
+        "the dissipation begins with a term of first order in the strain rate, `{0}` (At is dC/dt, Jt is dJ/dt): a body at \
+         rest would be stressed; write it in squares and products of rates"
+    )]
+    DampingAtRest(String),
     /// The law uses something that this version cannot differentiate.
     #[error("{0}")]
     Unsupported(String),
@@ -66,6 +73,8 @@ struct Session {
     conditions: Vec<(Expr, Expr)>,
     /// Whether a broken power of J multiplies what depends on the strain.
     isochoric: bool,
+    /// The symbols of the parameters' components, parameter by parameter.
+    parameters: Vec<Vec<Symbol>>,
 }
 
 impl Session {
@@ -85,6 +94,7 @@ impl Session {
         let ranges = reader.ranges(law);
         let conditions = std::mem::take(&mut reader.conditions);
         let isochoric = reader.isochoric;
+        let parameters = reader.parameters.clone();
         reader.far_from_rest();
         let far_energy = reader.scalar(&law.energy)?;
         let far_energy = cas.normalize(&far_energy)?;
@@ -101,6 +111,7 @@ impl Session {
             far_energy,
             conditions,
             isochoric,
+            parameters,
         })
     }
 
@@ -109,9 +120,10 @@ impl Session {
         let margin = self.margin.clone();
         let stress = self.stress()?;
         let dgradient = vector(&mut self.quantities, "dG", GradientIncrement, 9);
-        let increment = self.stress_increment(&stress, &dgradient)?;
+        let gradient = *self.strain.gradient();
+        let increment = self.stress_increment(&stress, &gradient, &dgradient)?;
         let node = vector(&mut self.quantities, "g", NodeGradient, 3);
-        let diagonal = self.diagonal(&stress, &node)?;
+        let diagonal = self.diagonal(&stress, &gradient, &node)?;
         let cauchy = self.cauchy(&stress);
         let (near_energy, at_rest) = self.near_energy()?;
         let near_stress = self.near_stress(&stress)?;
@@ -174,6 +186,10 @@ impl Session {
                 point.push(self.lower("cauchy_far", &[G], vec![(Output::Cauchy, cauchy)]));
             }
             None => point.push(self.lower("cauchy", &[G], vec![(Output::Cauchy, cauchy)])),
+        }
+        // Last: what a law without a dissipation has does not depend on there being such a thing.
+        if let Some(dissipation) = &law.dissipation {
+            point.extend(self.damping(dissipation, &dgradient, &node)?);
         }
         let parameters: u32 = law.parameters.iter().map(|p| p.len as u32).sum();
         let (material, names) = self.material(parameters)?;
@@ -319,18 +335,23 @@ impl Session {
         Ok(Differential::new(&mut self.cas, &mut self.quantities, "", seeds, others).of(&e)?)
     }
 
-    fn stress_increment(&mut self, stress: &[Expr; 9], dgradient: &[Symbol]) -> Result<Vec<Expr>, DeriveError> {
-        let seeds = self.strain.gradient().iter().copied().zip(dgradient.iter().map(|&s| s.into())).collect();
+    /// The differential of a stress where the nine quantities `by` change as given.
+    fn stress_increment(
+        &mut self,
+        stress: &[Expr; 9],
+        by: &[Symbol; 9],
+        dgradient: &[Symbol],
+    ) -> Result<Vec<Expr>, DeriveError> {
+        let seeds = by.iter().copied().zip(dgradient.iter().map(|&s| s.into())).collect();
         let mut d = Differential::new(&mut self.cas, &mut self.quantities, "d", seeds, vec![]);
         stress.iter().map(|p| Ok(d.of(p)?)).collect()
     }
 
-    /// For each displacement component i: g . dP_i. where dG = e_i (x) g.
-    fn diagonal(&mut self, stress: &[Expr; 9], node: &[Symbol]) -> Result<Vec<Expr>, DeriveError> {
+    /// For each displacement component i: g . dP_i. where `by` changes by e_i (x) g.
+    fn diagonal(&mut self, stress: &[Expr; 9], by: &[Symbol; 9], node: &[Symbol]) -> Result<Vec<Expr>, DeriveError> {
         let mut diagonal = Vec::new();
         for i in 0..3 {
-            let gradient = self.strain.gradient();
-            let seeds: BTreeMap<Symbol, Expr> = (0..3).map(|j| (gradient[3 * i + j], node[j].into())).collect();
+            let seeds: BTreeMap<Symbol, Expr> = (0..3).map(|j| (by[3 * i + j], node[j].into())).collect();
             let prefix = format!("d{i}_");
             let mut d = Differential::new(&mut self.cas, &mut self.quantities, &prefix, seeds, vec![]);
             let mut terms = Vec::new();

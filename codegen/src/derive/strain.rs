@@ -26,6 +26,10 @@ pub enum Base {
     Eps,
     /// C = F'F: where nothing is differentiated and the body is far from rest.
     C,
+    /// The rate of A, F' dF/dt + (dF/dt)' F.
+    RateA,
+    /// The rate of the small strain.
+    RateEps,
 }
 
 impl Base {
@@ -35,6 +39,8 @@ impl Base {
             Base::A => "A",
             Base::Eps => "eps",
             Base::C => "C",
+            Base::RateA => "At",
+            Base::RateEps => "epst",
         }
     }
 }
@@ -112,6 +118,9 @@ pub struct Strain {
     deformation: [Symbol; 9],
     bases: BTreeMap<Base, [Symbol; 6]>,
     jacobian: Option<Symbol>,
+    /// dG/dt, and dJ/dt, where something asks for rates.
+    rate: Option<[Symbol; 9]>,
+    jacobian_rate: Option<Symbol>,
     cofactors: Option<[Symbol; 9]>,
     /// The exponents of the sums of principal stretches, and the decomposition that they share.
     exponents: Vec<Expr>,
@@ -139,6 +148,8 @@ impl Strain {
             deformation,
             bases: BTreeMap::new(),
             jacobian: None,
+            rate: None,
+            jacobian_rate: None,
             cofactors: None,
             exponents: vec![],
             spectrum: None,
@@ -172,6 +183,10 @@ impl Strain {
             return Ok(components);
         }
         let (g, f) = (self.gradient.map(Expr::from), self.deformation.map(Expr::from));
+        let rate = match base {
+            Base::RateA | Base::RateEps => self.gradient_rate(quantities).map(Expr::from),
+            Base::A | Base::Eps | Base::C => std::array::from_fn(|_| Expr::int(0)),
+        };
         let mut components = Vec::with_capacity(6);
         for (a, b) in SYMMETRIC {
             let symmetric = g[3 * a + b].clone() + g[3 * b + a].clone();
@@ -182,6 +197,17 @@ impl Strain {
                 Base::Eps => (Expr::ratio(1, 2) * symmetric.clone(), Expr::ratio(1, 2) * symmetric),
                 Base::A => (symmetric + square(&g), square(&f)),
                 Base::C => (square(&f), square(&f)),
+                Base::RateA => {
+                    let term = |k: usize| {
+                        f[3 * k + a].clone() * rate[3 * k + b].clone() + rate[3 * k + a].clone() * f[3 * k + b].clone()
+                    };
+                    let sum = Expr::Sum((0..3).map(term).collect());
+                    (sum.clone(), sum)
+                }
+                Base::RateEps => {
+                    let mean = Expr::ratio(1, 2) * (rate[3 * a + b].clone() + rate[3 * b + a].clone());
+                    (mean.clone(), mean)
+                }
             };
             let mut partials = Vec::new();
             for s in definition.symbols() {
@@ -232,6 +258,49 @@ impl Strain {
         let j = quantities.add("J", Kind::Stage { value: Value::Expr(value), partials: Some(partials) });
         (self.jacobian, self.cofactors) = (Some(j), Some(cofactors));
         j
+    }
+
+    /// dG/dt, row by row.
+    pub fn gradient_rate(&mut self, quantities: &mut Quantities) -> [Symbol; 9] {
+        *self.rate.get_or_insert_with(|| {
+            std::array::from_fn(|k| quantities.add(name(k, "Gt"), Kind::Input(Input::GradientRate, k as u32)))
+        })
+    }
+
+    /// dJ/dt = K : dG/dt.
+    fn jacobian_rate(&mut self, cas: &mut Cas, quantities: &mut Quantities) -> Symbol {
+        if let Some(rate) = self.jacobian_rate {
+            return rate;
+        }
+        let (cofactors, rate) = (self.cofactors(cas, quantities), self.gradient_rate(quantities));
+        let terms = cofactors.iter().zip(rate).map(|(&k, g)| Expr::from(k) * g.into());
+        let symbol = quantities.stage("Jt", Expr::Sum(terms.collect()));
+        self.jacobian_rate = Some(symbol);
+        symbol
+    }
+
+    /// The rates of the strains and of J, as far as those are in use: the rate of any invariant is a sum over them.
+    pub fn rates(
+        &mut self,
+        cas: &mut Cas,
+        quantities: &mut Quantities,
+    ) -> Result<BTreeMap<Symbol, Expr>, UnexpectedTerm> {
+        let mut rates = BTreeMap::new();
+        for (base, rate) in [(Base::A, Base::RateA), (Base::Eps, Base::RateEps)] {
+            if let Some(components) = self.components(base) {
+                let rate = self.base(cas, quantities, rate)?;
+                rates.extend(components.into_iter().zip(rate.map(Expr::from)));
+            }
+        }
+        if let Some(j) = self.jacobian {
+            rates.insert(j, self.jacobian_rate(cas, quantities).into());
+        }
+        Ok(rates)
+    }
+
+    /// The rate of J, if in use.
+    pub fn rate_of_jacobian(&self) -> Option<Symbol> {
+        self.jacobian_rate
     }
 
     /// The symbol of an invariant, made on first use.
@@ -350,6 +419,23 @@ impl Strain {
             }
         }
         self.near_sums.clone()
+    }
+
+    /// The derivatives of a rate of strain or of J by the components of dG/dt, as (3 i + j, derivative).
+    pub fn by_gradient_rate(
+        &self,
+        cas: &mut Cas,
+        quantities: &Quantities,
+        s: Symbol,
+    ) -> Result<Vec<(usize, Expr)>, UnexpectedTerm> {
+        let (Some(rate), Kind::Stage { value: Value::Expr(e), .. }) = (self.rate, &quantities.get(s).kind) else {
+            return Ok(vec![]);
+        };
+        let mut derivatives = Vec::new();
+        for (ij, by) in rate.into_iter().enumerate().filter(|(_, by)| e.symbols().contains(by)) {
+            derivatives.push((ij, cas.derivative(e, by)?));
+        }
+        Ok(derivatives)
     }
 
     /// The derivatives of a strain component or of J by the components of G, as (3 i + j, derivative).

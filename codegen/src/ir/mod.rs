@@ -65,7 +65,9 @@ pub enum Input {
     Constants,
     /// G = grad u, 9 components.
     DisplacementGradient,
-    /// dG, the direction of a differential, 9 components.
+    /// dG/dt, the rate of the displacement gradient, 9 components.
+    GradientRate,
+    /// dG, the direction of a differential (by G, or by its rate), 9 components.
     GradientIncrement,
     /// g, the gradient of one node's interpolation function, 3 components (1/m).
     NodeGradient,
@@ -86,7 +88,7 @@ pub enum Output {
     Constants,
     /// W, the strain energy density.
     EnergyDensity,
-    /// P = dW/dG, the first Piola-Kirchhoff stress, 9 components.
+    /// P = dW/dG, the first Piola-Kirchhoff stress, or that of damping, dD/d(dG/dt); 9 components.
     Stress,
     /// dP, the differential of P in the direction dG, 9 components.
     StressIncrement,
@@ -94,6 +96,8 @@ pub enum Output {
     Diagonal,
     /// The Cauchy stress P F' / J, 9 components.
     Cauchy,
+    /// D, the dissipation density (W/m^3 for parameters in Pa and s).
+    DissipationDensity,
     /// Positive inside the law's domain: left side minus right side of the domain's inequality.
     DomainMargin,
     /// Positive where the kernel's form, split at the state of rest, serves.

@@ -28,7 +28,7 @@ pub struct InvalidKernel {
 fn input_length(role: Input) -> Option<u32> {
     match role {
         Input::Parameters | Input::Constants | Input::NodalDisplacement | Input::ShapeGradients => None,
-        Input::DisplacementGradient | Input::GradientIncrement | Input::StressIn => Some(9),
+        Input::DisplacementGradient | Input::GradientRate | Input::GradientIncrement | Input::StressIn => Some(9),
         Input::NodeGradient => Some(3),
         Input::Weight => Some(1),
     }
@@ -37,7 +37,7 @@ fn input_length(role: Input) -> Option<u32> {
 fn output_length(role: Output) -> Option<usize> {
     match role {
         Output::Constants | Output::NodalForce | Output::NodeGradients => None,
-        Output::EnergyDensity | Output::DomainMargin | Output::NearRest => Some(1),
+        Output::EnergyDensity | Output::DissipationDensity | Output::DomainMargin | Output::NearRest => Some(1),
         Output::Stress | Output::StressIncrement | Output::Cauchy | Output::DisplacementGradient => Some(9),
         Output::Diagonal => Some(3),
     }

@@ -31,6 +31,8 @@ pub struct Law {
     pub energy: Scalar,
     /// The parts of the energy by name where the file gives several (`energy_density_isochoric`, ...); empty otherwise.
     pub parts: Vec<(String, Scalar)>,
+    /// The dissipation potential D of strain and strain rate, in W/m^3, if the law has one.
+    pub dissipation: Option<Scalar>,
 }
 
 /// A material parameter.
@@ -138,6 +140,8 @@ pub enum ScalarNode {
     },
     /// A value that the author named by `let`: the name is kept for the generated text.
     Named(String, Scalar),
+    /// The rate of an invariant of the strain.
+    Rate(Scalar),
 }
 
 /// Invariants that the `Strain` argument offers. C = F'F.
@@ -200,4 +204,6 @@ pub enum TensorNode {
     Sub(Tensor, Tensor),
     /// s A.
     Scale(Scalar, Tensor),
+    /// The rate of a strain.
+    Rate(Tensor),
 }

@@ -10,8 +10,9 @@ use syn::{BinOp, Expr, ExprCall, ExprMethodCall, RangeLimits, Token};
 use super::ast::{ScalarNode, TensorNode};
 use super::dimension::Dimension;
 use super::expr::{Lowering, Scope};
-use super::functions::{ArgumentType, is_energy, plain_name};
+use super::functions::{ArgumentType, is_dissipation, is_energy, plain_name};
 use super::interval::{Interval, Values};
+use super::rate::rate;
 use super::value::{Integer, IntegerType, ScalarValue, TensorValue, Value};
 use super::words;
 
@@ -55,7 +56,8 @@ impl Lowering<'_> {
             }
             None => {
                 let own: Vec<String> = self.functions.keys().map(|name| format!("{name}(..)")).collect();
-                let own = own.iter().map(String::as_str).filter(|usage| !is_energy(words::bare(usage)));
+                let density = |name: &str| is_energy(name) || is_dissipation(name);
+                let own = own.iter().map(String::as_str).filter(|usage| !density(words::bare(usage)));
                 let offered: Vec<&str> = words::FUNCTIONS.iter().copied().chain(own).collect();
                 let remedy = words::suggest(&name, &offered, "the functions are");
                 self.broken(span, format!("unknown function `{name}`"), remedy)
@@ -71,9 +73,10 @@ impl Lowering<'_> {
 
     /// A function of the law file.
     fn helper(&mut self, name: &str, span: Span, arguments: &Arguments, scope: &Scope) -> Value {
-        if is_energy(name) {
+        if is_energy(name) || is_dissipation(name) {
+            let what = if is_energy(name) { "energy" } else { "dissipation" };
             let remedy = "move what they share into a helper function";
-            return self.broken(span, format!("`{name}` is the energy itself, and is not called"), remedy);
+            return self.broken(span, format!("`{name}` is the {what} itself, and is not called"), remedy);
         }
         let expected = self.functions.get(name).and_then(|function| function.arguments.clone());
         let Some(expected) = expected else {
@@ -92,13 +95,18 @@ impl Lowering<'_> {
             values.push(match (argument.kind, value) {
                 (_, Value::Broken) => Value::Broken,
                 (ArgumentType::Strain, Value::Strain) => Value::Strain,
+                (ArgumentType::StrainRate, Value::StrainRate) => Value::StrainRate,
                 (ArgumentType::Parameters, Value::Parameters) => Value::Parameters,
                 // The argument's declared f64 gives a literal its type.
                 (ArgumentType::Scalar, value) => self
                     .as_scalar(value, expr)
                     .map_or(Value::Broken, |value| Value::Scalar(ScalarValue { untyped: false, ..value })),
                 (kind, other) => {
-                    let wanted = if kind == ArgumentType::Strain { "Strain" } else { "Parameters" };
+                    let wanted = match kind {
+                        ArgumentType::Strain => "Strain",
+                        ArgumentType::StrainRate => "StrainRate",
+                        ArgumentType::Parameters | ArgumentType::Scalar => "Parameters",
+                    };
                     let reason = format!("`{}` of `{name}` is a {wanted}, and this is {}", argument.name, other.kind());
                     self.broken(expr.span(), reason, "pass the argument of the energy function itself")
                 }
@@ -199,6 +207,18 @@ impl Lowering<'_> {
             Value::Scalar(scalar) => scalar,
             Value::Broken => return Value::Broken,
             Value::Strain if name == "stretch_sum" => return self.stretch_sum(call, scope),
+            Value::StrainRate if name == "stretch_sum" => return rate(self.stretch_sum(call, scope)),
+            Value::StrainRate => {
+                if let Some(usage) = words::fibre_invariant(&name) {
+                    return rate(self.fibre_invariant(usage, call, scope));
+                }
+                let remedy = if words::STRAIN.contains(&name.as_str()) {
+                    format!("write `r.{name}` without the brackets")
+                } else {
+                    words::suggest(&name, words::STRAIN, "take a field of it:")
+                };
+                return self.broken(span, format!("the strain rate has no method `{name}`"), remedy);
+            }
             Value::Strain => {
                 if let Some(usage) = words::fibre_invariant(&name) {
                     return self.fibre_invariant(usage, call, scope);

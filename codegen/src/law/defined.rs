@@ -3,7 +3,7 @@
 use proc_macro2::Span;
 
 use super::expr::Lowering;
-use super::interval::Values;
+use super::interval::{Interval, Values};
 use super::value::ScalarValue;
 
 /// What a law's attributes declare, as far as expressions depend on it.
@@ -36,6 +36,9 @@ impl Lowering<'_> {
 
     /// Refuses `function` of a strain expression that can be 0 or negative, if the law declares no domain.
     pub(super) fn positive(&mut self, function: &str, x: &ScalarValue, span: Span) {
+        if x.facts.rate {
+            return self.at_every_rate(&format!("`{function}` of"), x, span, |values| values.is_positive());
+        }
         if x.facts.strain && self.unprotected() && !x.values.anywhere.is_positive() {
             let reason = format!("`{function}` of a value that can be 0 or negative, and the law has no domain");
             self.error(span, reason, remedy(x.values, |values| values.upright.is_positive()));
@@ -44,9 +47,22 @@ impl Lowering<'_> {
 
     /// Refuses a strain expression as a divisor if it can be 0 and the law declares no domain.
     pub(super) fn divides(&mut self, x: &ScalarValue, span: Span) {
+        if x.facts.rate {
+            return self.at_every_rate("division by", x, span, |values| values.is_nonzero());
+        }
         if x.facts.strain && self.unprotected() && !x.values.anywhere.is_nonzero() {
             let reason = "division by a value that can be 0, and the law has no domain";
             self.error(span, reason, remedy(x.values, |values| values.upright.is_nonzero()));
+        }
+    }
+
+    /// Refuses a function of rates that is not defined at all of them: no domain keeps a body from being at rest.
+    fn at_every_rate(&mut self, function: &str, x: &ScalarValue, span: Span, holds: fn(Interval) -> bool) {
+        let values = if self.unprotected() { x.values.anywhere } else { x.values.upright };
+        if !holds(values) {
+            let reason = format!("{function} a value that can be 0 or negative at some rate");
+            let remedy = "add what keeps it positive also at rest, as in `(1.0 + ddot(r.E, r.E) / p.reference.powi(2)).powf(p.m)`";
+            self.error(span, reason, remedy);
         }
     }
 

@@ -20,7 +20,14 @@ const TRACKED: i64 = 1 << 20;
 /// Energy densities.
 pub(super) const PRESSURE: Dimension = Dimension([Ratio::new_raw(0, 1), Ratio::new_raw(1, 1), Ratio::new_raw(0, 1)]);
 
+/// Dissipation densities: W/m^3.
+const POWER: Dimension = Dimension([Ratio::new_raw(0, 1), Ratio::new_raw(1, 1), Ratio::new_raw(-1, 1)]);
+
 impl Dimension {
+    /// Rates of strain.
+    pub(super) const FREQUENCY: Dimension =
+        Dimension([Ratio::new_raw(0, 1), Ratio::new_raw(0, 1), Ratio::new_raw(-1, 1)]);
+
     /// A pure number.
     pub(super) const ONE: Dimension = Dimension([Ratio::new_raw(0, 1); 3]);
 
@@ -97,6 +104,14 @@ impl Lowering<'_> {
         let Some(found) = dimension.filter(|found| *found != PRESSURE) else { return };
         let reason = format!("`{name}` is an energy density, in Pa, and this is {found}");
         let remedy = "numbers have no unit: stiffnesses are parameters with `#[unit(\"Pa\")]`, one in each term";
+        self.error(span, reason, remedy);
+    }
+
+    /// Refuses a dissipation density that is not in Pa/s.
+    pub(super) fn dissipation_dimension(&mut self, name: &str, dimension: Option<Dimension>, span: Span) {
+        let Some(found) = dimension.filter(|found| *found != POWER) else { return };
+        let reason = format!("`{name}` is a dissipation density, in Pa/s (W/m^3), and this is {found}");
+        let remedy = "numbers have no unit: viscosities are parameters with `#[unit(\"Pa s\")]`, times two rates each";
         self.error(span, reason, remedy);
     }
 }

@@ -173,6 +173,10 @@ impl<'a> Lowering<'a> {
                 let remedy = "take one of its fields, such as `s.I1` or `s.J`";
                 self.error(expr.span(), "a scalar is needed here, and this is the strain", remedy);
             }
+            Value::StrainRate => {
+                let remedy = "take one of its fields, such as `r.J`, or `ddot(r.E, r.E)`";
+                self.error(expr.span(), "a scalar is needed here, and this is the strain rate", remedy);
+            }
             Value::Parameters => {
                 let remedy = "take one of its fields, as in `p.name`";
                 self.error(expr.span(), "a scalar is needed here, and this is the parameters", remedy);
@@ -303,6 +307,7 @@ impl<'a> Lowering<'a> {
         };
         match base {
             Value::Strain => self.strain_field(&name, span),
+            Value::StrainRate => self.rate_field(&name, span),
             Value::Parameters => self.parameter_field(&name, span),
             Value::Broken => Value::Broken,
             other => {

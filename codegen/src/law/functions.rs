@@ -14,6 +14,7 @@ use super::value::{ScalarValue, Value};
 pub(super) enum ArgumentType {
     Scalar,
     Strain,
+    StrainRate,
     Parameters,
 }
 
@@ -45,9 +46,21 @@ impl Function<'_> {
 /// The signature that the energy has to have.
 pub(super) const ENERGY_SIGNATURE: &str = "(s: Strain, p: Parameters) -> f64";
 
+/// The signature that the dissipation has to have.
+pub(super) const DISSIPATION_SIGNATURE: &str = "(s: Strain, r: StrainRate, p: Parameters) -> f64";
+
 /// Whether a function of this name is the energy, or a part of it.
 pub(super) fn is_energy(name: &str) -> bool {
-    let rest = name.strip_prefix("energy_density");
+    is_part_of("energy_density", name)
+}
+
+/// Whether a function of this name is the dissipation, or a part of it.
+pub(super) fn is_dissipation(name: &str) -> bool {
+    is_part_of("dissipation_density", name)
+}
+
+fn is_part_of(whole: &str, name: &str) -> bool {
+    let rest = name.strip_prefix(whole);
     rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('_') && rest.len() > 1)
 }
 
@@ -79,6 +92,7 @@ impl<'a> Function<'a> {
             let kind = match type_name(&typed.ty).as_deref() {
                 Some("f64") => Some(ArgumentType::Scalar),
                 Some("Strain") => Some(ArgumentType::Strain),
+                Some("StrainRate") => Some(ArgumentType::StrainRate),
                 Some("Parameters") => Some(ArgumentType::Parameters),
                 _ => None,
             };
@@ -86,7 +100,7 @@ impl<'a> Function<'a> {
                 (None, _) => error(typed.pat.span(), "an argument is a plain name", "write `x: f64`"),
                 (_, None) => {
                     let reason = "unknown type of an argument";
-                    error(typed.ty.span(), reason, "the types are f64, Strain and Parameters");
+                    error(typed.ty.span(), reason, "the types are f64, Strain, StrainRate and Parameters");
                 }
                 (Some((name, span)), Some(_)) if arguments.iter().any(|known| known.name == name) => {
                     error(span, "two arguments have this name", "give each argument its own name");

@@ -16,6 +16,7 @@ mod literals;
 mod metadata;
 mod parse;
 mod powers;
+mod rate;
 mod strain;
 mod units;
 mod uses;

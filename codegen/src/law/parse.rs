@@ -10,7 +10,7 @@ use syn::{Expr, Item, ItemConst};
 use super::ast::{Domain, Law, Scalar};
 use super::error::{LawError, Place, Source};
 use super::expr::{Lowering, Scope};
-use super::functions::{ArgumentType, ENERGY_SIGNATURE, Function, is_energy};
+use super::functions::{ArgumentType, ENERGY_SIGNATURE, Function, is_dissipation, is_energy};
 use super::metadata::{self, Metadata, type_name};
 use super::strain::strain;
 use super::uses::unused;
@@ -65,6 +65,7 @@ pub fn parse(path: &str, text: &str) -> Result<Law, Vec<LawError>> {
     }
     lowering.arguments();
     let energy = lowering.energy(items.has_parameters);
+    let dissipation = lowering.dissipation(items.has_parameters);
     let domain = metadata.domain.as_ref().and_then(|(expr, span)| lowering.domain(expr, *span));
     if lowering.errors.is_empty()
         && let Some((energy, parts)) = &energy
@@ -74,7 +75,8 @@ pub fn parse(path: &str, text: &str) -> Result<Law, Vec<LawError>> {
             let reason = "the law says `small_strain`, and does not use `eps`";
             lowering.error(place, reason, "remove the attribute: the law does not change under rotation");
         }
-        let unused = unused(&source, &metadata, energy, parts, domain.as_ref());
+        let others: Vec<&Scalar> = parts.iter().map(|(_, part)| part).chain(&dissipation).collect();
+        let unused = unused(&source, &metadata, energy, &others, domain.as_ref());
         lowering.errors.extend(unused);
     }
     let errors = lowering.errors;
@@ -82,7 +84,8 @@ pub fn parse(path: &str, text: &str) -> Result<Law, Vec<LawError>> {
         Some((energy, parts)) if errors.is_empty() => {
             let (path, text) = (path.to_owned(), text.to_owned());
             let small_strain = metadata.small_strain.is_some();
-            Ok(Law { name, path, text, docs, parameters: metadata.parameters, domain, small_strain, energy, parts })
+            let parameters = metadata.parameters;
+            Ok(Law { name, path, text, docs, parameters, domain, small_strain, energy, parts, dissipation })
         }
         _ => Err(sorted(errors)),
     }
@@ -219,14 +222,7 @@ impl Lowering<'_> {
 
     /// W and its parts; `None` if an error was noted.
     fn energy(&mut self, has_parameters: bool) -> Option<(Scalar, Vec<(String, Scalar)>)> {
-        let mut functions: Vec<(String, Span)> = self
-            .functions
-            .values()
-            .filter(|function| is_energy(&function.name))
-            .map(|function| (function.name.clone(), function.span))
-            .collect();
-        // In the order of the file, which is the order of the sum.
-        functions.sort_by_key(|(_, span)| Place::from(*span));
+        let functions = self.densities(is_energy);
         if functions.is_empty() {
             let names: Vec<&str> = self.functions.keys().map(String::as_str).collect();
             let found = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
@@ -255,6 +251,14 @@ impl Lowering<'_> {
             parts.clear();
         }
         Some((total.node, parts.into_iter().map(|(name, value)| (name, value.node)).collect()))
+    }
+
+    /// The functions of these names, in the order of the file, which is the order of their sum.
+    pub(super) fn densities(&self, named: fn(&str) -> bool) -> Vec<(String, Span)> {
+        let found = self.functions.values().filter(|function| named(&function.name));
+        let mut found: Vec<(String, Span)> = found.map(|function| (function.name.clone(), function.span)).collect();
+        found.sort_by_key(|(_, span)| Place::from(*span));
+        found
     }
 
     /// The energy, or one part of it.
@@ -329,7 +333,8 @@ impl Lowering<'_> {
     /// Refuses helper functions that are never called: their bodies are checked only where they are written out.
     fn uncalled(&mut self) {
         let functions = self.functions.values();
-        let uncalled = functions.filter(|f| !is_energy(&f.name) && !self.called.contains(&f.name));
+        let density = |name: &str| is_energy(name) || is_dissipation(name);
+        let uncalled = functions.filter(|f| !density(&f.name) && !self.called.contains(&f.name));
         let uncalled: Vec<(String, Span)> = uncalled.map(|f| (f.name.clone(), f.span)).collect();
         for (name, span) in uncalled {
             self.error(span, format!("the function `{name}` is never called"), "call it in the energy, or delete it");

@@ -7,18 +7,18 @@ use super::ast::{Domain, Scalar, ScalarNode, Tensor, TensorNode};
 use super::error::{LawError, Source};
 use super::metadata::Metadata;
 
-/// Parameters, and components of array parameters, that neither the energy nor the domain uses.
+/// Parameters, and components of array parameters, that none of the energy, `others` and the domain uses.
 pub(super) fn unused(
     source: &Source,
     metadata: &Metadata,
     energy: &Scalar,
-    parts: &[(String, Scalar)],
+    others: &[&Scalar],
     domain: Option<&Domain>,
 ) -> Vec<LawError> {
     let mut uses = Uses::default();
     uses.scalar(energy);
-    for (_, part) in parts {
-        uses.scalar(part);
+    for other in others {
+        uses.scalar(other);
     }
     for side in domain.iter().flat_map(|domain| [&domain.left, &domain.right]) {
         uses.scalar(side);
@@ -80,7 +80,8 @@ impl Uses {
             | ScalarNode::Ln(a)
             | ScalarNode::Exp(a)
             | ScalarNode::Sqrt(a)
-            | ScalarNode::Named(_, a) => self.scalar(a),
+            | ScalarNode::Named(_, a)
+            | ScalarNode::Rate(a) => self.scalar(a),
             ScalarNode::Select { left, right, then, otherwise } => {
                 for side in [left, right, then, otherwise] {
                     self.scalar(side);
@@ -103,6 +104,7 @@ impl Uses {
                 self.scalar(s);
                 self.tensor(a);
             }
+            TensorNode::Rate(a) => self.tensor(a),
         }
     }
 }

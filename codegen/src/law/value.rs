@@ -11,8 +11,10 @@ use super::interval::{Interval, Values};
 /// Facts of a tree that the checks ask for often, kept beside it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Facts {
-    /// Whether the strain occurs in it.
+    /// Whether the strain or its rate occurs in it.
     pub(super) strain: bool,
+    /// Whether the strain's rate occurs in it.
+    pub(super) rate: bool,
     /// Levels of nodes.
     pub(super) depth: usize,
     /// The dimension; `None` fits anything.
@@ -21,12 +23,13 @@ pub(super) struct Facts {
 
 impl Facts {
     fn leaf(strain: bool, dimension: Option<Dimension>) -> Facts {
-        Facts { strain, depth: 1, dimension }
+        Facts { strain, rate: false, depth: 1, dimension }
     }
 
     fn over(parts: &[Facts], dimension: Option<Dimension>) -> Facts {
         Facts {
             strain: parts.iter().any(|part| part.strain),
+            rate: parts.iter().any(|part| part.rate),
             depth: 1 + parts.iter().map(|part| part.depth).max().unwrap_or(0),
             dimension,
         }
@@ -94,6 +97,8 @@ pub(super) enum Value {
     Scalar(ScalarValue),
     Tensor(TensorValue),
     Strain,
+    /// The rate of the strain.
+    StrainRate,
     Parameters,
     /// An array parameter, by its index.
     Array(usize),
@@ -111,6 +116,7 @@ impl Value {
             Value::Scalar(_) => "a scalar",
             Value::Tensor(_) => "a tensor",
             Value::Strain => "the strain",
+            Value::StrainRate => "the strain rate",
             Value::Parameters => "the parameters",
             Value::Array(_) => "an array",
             Value::Direction(_) => "a direction",
@@ -335,6 +341,12 @@ impl TensorValue {
         let values = match (&*self.node, &*other.node) {
             (TensorNode::C, TensorNode::C) => Values::of_invariant(Invariant::I1),
             (TensorNode::E, TensorNode::E) | (TensorNode::Eps, TensorNode::Eps) => Values::of(Interval::NON_NEGATIVE),
+            // Rates of one strain.
+            (TensorNode::Rate(a), TensorNode::Rate(b))
+                if std::mem::discriminant(&**a) == std::mem::discriminant(&**b) =>
+            {
+                Values::of(Interval::NON_NEGATIVE)
+            }
             _ if Rc::ptr_eq(&self.node, &other.node) => Values::of(Interval::NON_NEGATIVE),
             _ => Values::ALL,
         };

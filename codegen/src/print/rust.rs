@@ -3,7 +3,7 @@
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{ToTokens, format_ident, quote};
 
-use crate::derivation::{Derivation, PointKernel};
+use crate::derivation::{DAMPING_KERNELS, Derivation, PointKernel};
 use crate::element::ElementKernels;
 use crate::ir::{Input, Op, Output, Rational, ValidKernel, ValueId};
 use crate::law::ast::{Law, Parameter};
@@ -37,6 +37,7 @@ pub fn law_module(law: &Law, derivation: &Derivation, reviewed: bool) -> TokenSt
         let far = point_kernel(far, &far.ir().name, margin);
         quote!(#near #[cold] #[inline(never)] #far)
     });
+    let damping = damping(derivation);
     quote! {
         #docs
         pub mod #module {
@@ -52,6 +53,20 @@ pub fn law_module(law: &Law, derivation: &Derivation, reviewed: bool) -> TokenSt
                 #(#methods)*
             }
             #(#forms)*
+            #damping
+        }
+    }
+}
+
+/// The damping of a law with a dissipation.
+fn damping(derivation: &Derivation) -> TokenStream {
+    if !derivation.is_dissipative() {
+        return quote!();
+    }
+    let methods = DAMPING_KERNELS.map(|name| point_kernel(derivation.kernel(name), name, false));
+    quote! {
+        impl ::tensormass_kernels::Dissipative for Law {
+            #(#methods)*
         }
     }
 }

@@ -5,8 +5,8 @@
 //! count.
 
 use rayon::prelude::*;
-use tensormass_kernels::BatchKernels;
 use tensormass_kernels::batch::{Batch, RestElement};
+use tensormass_kernels::{BatchKernels, DampingKernels};
 
 use super::{CpuBackend, Precision};
 use crate::backend::{Backend, ForceField, LeftDomain, Operator, REGISTERS, RUNNING, SUM};
@@ -24,6 +24,8 @@ struct CpuBatch<R: Precision> {
     law: &'static str,
     domain: &'static str,
     kernels: BatchKernels<R>,
+    /// Only where the law has a dissipation.
+    damping: Option<DampingKernels<R>>,
     nodes: Vec<[u32; 4]>,
     rest: Vec<RestElement<R>>,
     constants: Vec<R>,
@@ -44,6 +46,7 @@ impl<R: Precision> CpuBatch<R> {
             law: batch.law.info.name,
             domain: batch.law.info.domain.unwrap_or("everywhere"),
             kernels: R::kernels(batch.law),
+            damping: R::damping_kernels(batch.law),
             nodes: batch.elements.iter().map(|&e| body.elements[e as usize]).collect(),
             rest: batch.elements.iter().map(rest).collect(),
             constants: batch.constants.iter().map(|&c| round(c)).collect(),
@@ -129,6 +132,24 @@ impl<R: Precision> CpuField<R> {
         result
     }
 
+    /// Pass 1 of damping: every batch into its slots, 0 where a law has none.
+    fn damping(&mut self, kernel: impl Fn(&DampingKernels<R>, &Batch<R>, &mut [Slots<R>]) + Sync) {
+        let mut rest = self.slots.as_mut_slice();
+        for batch in &self.batches {
+            let (slots, others) = rest.split_at_mut(batch.nodes.len());
+            rest = others;
+            let Some(kernels) = &batch.damping else {
+                slots.fill([[R::default(); 3]; 4]);
+                continue;
+            };
+            let done = batch.run(slots, |view, out| {
+                kernel(kernels, view, out);
+                None
+            });
+            debug_assert!(done.is_ok(), "damping reports no domain");
+        }
+    }
+
     /// Pass 2: y += factor times the sum of each node's slots.
     fn nodes(&self, factor: R, y: &mut [[R; 3]]) {
         let flat = self.slots.as_flattened();
@@ -189,22 +210,59 @@ impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
         backend.copy(u, &mut self.state);
     }
 
-    fn add_dforce(&mut self, _: &CpuBackend<R>, du: &Vec<[R; 3]>, factor: f64, df: &mut Vec<[R; 3]>) {
+    fn add_dforce(&mut self, backend: &CpuBackend<R>, du: &Vec<[R; 3]>, factor: f64, df: &mut Vec<[R; 3]>) {
         let state = std::mem::take(&mut self.state);
+        self.add_dforce_at(backend, &state, du, factor, df);
+        self.state = state;
+    }
+
+    fn add_diagonal(&mut self, backend: &CpuBackend<R>, factor: f64, d: &mut Vec<[R; 3]>) {
+        let state = std::mem::take(&mut self.state);
+        self.add_diagonal_at(backend, &state, factor, d);
+        self.state = state;
+    }
+
+    fn add_dforce_at(
+        &mut self,
+        _: &CpuBackend<R>,
+        u: &Vec<[R; 3]>,
+        du: &Vec<[R; 3]>,
+        factor: f64,
+        df: &mut Vec<[R; 3]>,
+    ) {
         let done = self.elements(|kernels, batch, out| {
-            (kernels.dforce)(batch, &state, du, out);
+            (kernels.dforce)(batch, u, du, out);
             None
         });
         debug_assert!(done.is_ok(), "a differential reports no domain");
-        self.state = state;
         self.nodes(R::from_f64(factor), df);
     }
 
-    fn add_diagonal(&mut self, _: &CpuBackend<R>, factor: f64, d: &mut Vec<[R; 3]>) {
-        let state = std::mem::take(&mut self.state);
-        let done = self.elements(|kernels, batch, out| (kernels.diagonal)(batch, &state, out));
+    fn add_diagonal_at(&mut self, _: &CpuBackend<R>, u: &Vec<[R; 3]>, factor: f64, d: &mut Vec<[R; 3]>) {
+        let done = self.elements(|kernels, batch, out| (kernels.diagonal)(batch, u, out));
         debug_assert!(done.is_ok(), "a diagonal reports no domain");
-        self.state = state;
+        self.nodes(R::from_f64(factor), d);
+    }
+
+    fn add_damping(&mut self, _: &CpuBackend<R>, [u, v]: [&Vec<[R; 3]>; 2], factor: f64, f: &mut Vec<[R; 3]>) {
+        self.damping(|kernels, batch, out| (kernels.damping)(batch, u, v, out));
+        self.nodes(R::from_f64(factor), f);
+    }
+
+    fn add_ddamping(
+        &mut self,
+        _: &CpuBackend<R>,
+        [u, v]: [&Vec<[R; 3]>; 2],
+        dv: &Vec<[R; 3]>,
+        factor: f64,
+        df: &mut Vec<[R; 3]>,
+    ) {
+        self.damping(|kernels, batch, out| (kernels.ddamping)(batch, u, v, dv, out));
+        self.nodes(R::from_f64(factor), df);
+    }
+
+    fn add_damping_diagonal(&mut self, _: &CpuBackend<R>, [u, v]: [&Vec<[R; 3]>; 2], factor: f64, d: &mut Vec<[R; 3]>) {
+        self.damping(|kernels, batch, out| (kernels.diagonal)(batch, u, v, out));
         self.nodes(R::from_f64(factor), d);
     }
 

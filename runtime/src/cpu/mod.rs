@@ -6,7 +6,7 @@ mod vectors;
 pub use field::CpuField;
 pub use vectors::CpuBackend;
 
-use tensormass_kernels::{BatchKernels, LawEntry, Real};
+use tensormass_kernels::{BatchKernels, DampingKernels, LawEntry, Real};
 
 /// A precision of the CPU backend.
 pub trait Precision: Real + Default + std::iter::Sum {
@@ -14,6 +14,8 @@ pub trait Precision: Real + Default + std::iter::Sum {
     const EPSILON: f64;
     /// The law's kernels in this precision.
     fn kernels(law: &LawEntry) -> BatchKernels<Self>;
+    /// The kernels of the law's damping in this precision, if it has a dissipation.
+    fn damping_kernels(law: &LawEntry) -> Option<DampingKernels<Self>>;
 }
 
 impl Precision for f32 {
@@ -21,11 +23,17 @@ impl Precision for f32 {
     fn kernels(law: &LawEntry) -> BatchKernels<Self> {
         (law.f32)()
     }
+    fn damping_kernels(law: &LawEntry) -> Option<DampingKernels<Self>> {
+        law.damping.map(|damping| (damping.f32)())
+    }
 }
 
 impl Precision for f64 {
     const EPSILON: f64 = f64::EPSILON / 2.0;
     fn kernels(law: &LawEntry) -> BatchKernels<Self> {
         (law.f64)()
+    }
+    fn damping_kernels(law: &LawEntry) -> Option<DampingKernels<Self>> {
+        law.damping.map(|damping| (damping.f64)())
     }
 }

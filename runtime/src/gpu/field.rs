@@ -9,7 +9,7 @@ use std::rc::Rc;
 
 use tensormass_kernels::LawEntry;
 use tensormass_kernels::generated::tetrahedron_p1::{NODE_PRODUCT, NODE_SUM};
-use tensormass_kernels::shader::{Binding, LawShaders, Shader};
+use tensormass_kernels::shader::{Binding, Shader};
 
 use crate::backend::{Backend, ForceField, LeftDomain, Operator};
 use crate::body::{Body, LawBatch};
@@ -46,10 +46,23 @@ struct Page {
     offsets: Memory,
 }
 
+/// A pass of a law; none of damping where the law has no dissipation.
+type Pass = fn(&LawEntry) -> Option<&'static Shader>;
+
+/// Which elements a pass runs over.
+#[derive(Debug, Clone, Copy)]
+enum Of {
+    All,
+    /// Those of laws with a dissipation.
+    Damped,
+}
+
 /// All elements of a body.
 pub struct GpuField {
     recorder: Rc<Recorder>,
     pages: Vec<Page>,
+    /// The elements of laws with a dissipation, with slots of their own, where some laws have one and some do not.
+    damped: Option<Vec<Page>>,
     slots: Memory,
     /// The displacement at which the tangent is taken; none where no law's tangent depends on it.
     state: Option<GpuVector>,
@@ -65,6 +78,7 @@ pub struct GpuField {
 #[derive(Default)]
 struct Bound<'a> {
     displacement: Option<&'a Memory>,
+    velocity: Option<&'a Memory>,
     increment: Option<&'a Memory>,
     gate: Option<&'a Memory>,
 }
@@ -79,8 +93,13 @@ impl GpuField {
         let options = backend.options();
         let limit = recorder.gpu().limits().storage_binding_bytes;
         let limit = options.binding_bytes.map_or(limit, |bytes| bytes.min(limit));
-        let parts = paged(body, limit);
-        let pages = parts.iter().map(|p| Page::new(&recorder, body, p)).collect::<Result<Vec<_>, _>>()?;
+        let pages = |of: &dyn Fn(&LawBatch) -> bool| -> Result<Vec<Page>, DeviceError> {
+            paged(body.batches.iter().filter(|b| of(b)), limit).iter().map(|p| Page::new(&recorder, body, p)).collect()
+        };
+        let dissipative = |b: &LawBatch| b.law.damping.is_some();
+        let mixed = body.is_viscous() && !body.batches.iter().all(dissipative);
+        let damped = if mixed { Some(pages(&dissipative)?) } else { None };
+        let pages = pages(&|_| true)?;
         let largest = pages.iter().map(Page::elements).max().unwrap_or(0);
         let depends = |shader: &Shader| shader.bindings.contains(&Binding::Displacement);
         let state = body.batches.iter().map(|b| b.law.shaders).any(|s| depends(&s.dforce) || depends(&s.diagonal));
@@ -94,6 +113,7 @@ impl GpuField {
             elements_per_invocation: options.elements_per_invocation,
             recorder,
             pages,
+            damped,
         };
         backend.check()?;
         Ok(field)
@@ -125,13 +145,21 @@ impl GpuField {
         Rc::clone(made)
     }
 
+    /// The pages of some elements: where every law has a dissipation, those of all.
+    fn pages_of(&self, of: Of) -> &[Page] {
+        match (of, &self.damped) {
+            (Of::Damped, Some(damped)) => damped,
+            (Of::All | Of::Damped, _) => &self.pages,
+        }
+    }
+
     /// Pass 1 of one page: a pass of each law.
-    fn element_passes(&mut self, page: usize, pass: fn(&LawShaders) -> &Shader, bound: &Bound) {
-        for range in 0..self.pages[page].ranges.len() {
-            let shader = pass(self.pages[page].ranges[range].law.shaders);
-            let Range { stride, law, .. } = self.pages[page].ranges[range];
+    fn element_passes(&mut self, of: Of, page: usize, pass: Pass, bound: &Bound) {
+        for range in 0..self.pages_of(of)[page].ranges.len() {
+            let Range { stride, law, .. } = self.pages_of(of)[page].ranges[range];
+            let shader = pass(law).expect("damping runs over laws with a dissipation");
             let kernel = self.kernel(shader, stride, law.info.name);
-            let range = &self.pages[page].ranges[range];
+            let range = &self.pages_of(of)[page].ranges[range];
             let storage: Vec<&Memory> = shader.bindings[1..].iter().map(|&b| self.buffer(b, range, bound)).collect();
             let count = range.elements.len();
             let invocations = count.div_ceil(self.elements_per_invocation as usize);
@@ -151,6 +179,7 @@ impl GpuField {
             Binding::Margins => range.margins.as_ref(),
             Binding::Energies | Binding::Stresses => range.output.as_ref(),
             Binding::Displacement => bound.displacement.or_else(state),
+            Binding::Velocity => bound.velocity,
             Binding::Increment => bound.increment,
             Binding::Gate => Some(bound.gate.unwrap_or(&self.gate)),
             Binding::ElementPass
@@ -165,26 +194,52 @@ impl GpuField {
     }
 
     /// Pass 2 of one page: y += factor times the sum of each node's slots.
-    fn node_pass(&mut self, page: usize, nodes: usize, factor: f64, y: &GpuVector) {
+    fn node_pass(&mut self, of: Of, page: usize, nodes: usize, factor: f64, y: &GpuVector) {
         let kernel = self.kernel(&NODE_SUM, 0, "sum of slots");
         let numbers = [nodes as u32, 0, (factor as f32).to_bits(), 0];
-        let storage = [&self.slots, &self.pages[page].offsets, y.memory()];
+        let storage = [&self.slots, &self.pages_of(of)[page].offsets, y.memory()];
         let groups = self.recorder.groups(nodes, self.work_group_size);
         self.recorder.dispatch(&kernel, numbers, &storage, groups);
     }
 
     /// Both passes of every page: y += factor times the sums.
-    fn passes(
+    fn passes(&mut self, backend: &GpuBackend, (of, pass): (Of, Pass), bound: &Bound, factor: f64, y: &GpuVector) {
+        for page in 0..self.pages_of(of).len() {
+            self.element_passes(of, page, pass, bound);
+            self.node_pass(of, page, backend.nodes(), factor, y);
+        }
+    }
+
+    /// Adds a part of a product: y += factor times the sums, and their partial scalar products with x. The first part of a
+    /// product brings the masses.
+    fn part_of_product(
         &mut self,
         backend: &GpuBackend,
-        pass: fn(&LawShaders) -> &Shader,
+        (of, pass): (Of, Pass),
         bound: &Bound,
-        factor: f64,
-        y: &GpuVector,
+        (factor, first): (f64, Option<f64>),
+        masses: &GpuVector,
+        [x, y]: [&GpuVector; 2],
     ) {
-        for page in 0..self.pages.len() {
-            self.element_passes(page, pass, bound);
-            self.node_pass(page, backend.nodes(), factor, y);
+        let nodes = backend.nodes();
+        let groups = self.recorder.groups(nodes, self.work_group_size);
+        for page in 0..self.pages_of(of).len() {
+            self.element_passes(of, page, pass, bound);
+            let kernel = self.kernel(&NODE_PRODUCT, 0, "product at nodes");
+            let mass = first.filter(|_| page == 0);
+            // The slots hold -K x or -C x.
+            let factors = [-factor, mass.or(first).unwrap_or(0.0)].map(|f| (f as f32).to_bits());
+            let numbers = [nodes as u32, u32::from(mass.is_some()), factors[0], factors[1]];
+            let storage = [
+                &self.slots,
+                &self.pages_of(of)[page].offsets,
+                x.memory(),
+                masses.memory(),
+                y.memory(),
+                backend.partials(),
+                bound.gate.unwrap_or(&self.gate),
+            ];
+            self.recorder.dispatch(&kernel, numbers, &storage, groups);
         }
     }
 
@@ -222,7 +277,7 @@ impl GpuField {
     }
 
     /// Runs an output pass of `width` numbers an element; the numbers in the mesh's order. NaN if the device fails.
-    fn output(&mut self, u: &GpuVector, pass: fn(&LawShaders) -> &Shader, width: usize) -> Vec<f64> {
+    fn output(&mut self, u: &GpuVector, pass: Pass, width: usize) -> Vec<f64> {
         for page in 0..self.pages.len() {
             for range in &mut self.pages[page].ranges {
                 // As large as the widest pass that was asked for: energies alone take a ninth of stresses.
@@ -232,7 +287,7 @@ impl GpuField {
                 }
             }
             let bound = Bound { displacement: Some(u.memory()), ..Bound::default() };
-            self.element_passes(page, pass, &bound);
+            self.element_passes(Of::All, page, pass, &bound);
         }
         let mut values = vec![f64::NAN; width * self.elements];
         for range in self.pages.iter().flat_map(|p| &p.ranges) {
@@ -251,11 +306,11 @@ impl GpuField {
 /// A part of one law's elements: the batch, and which of its elements.
 type Part<'a> = (&'a LawBatch, std::ops::Range<usize>);
 
-/// The elements of a body in pages whose buffers have at most `limit` bytes.
-fn paged(body: &Body, limit: u64) -> Vec<Vec<Part<'_>>> {
+/// Elements in pages whose buffers have at most `limit` bytes.
+fn paged<'a>(batches: impl Iterator<Item = &'a LawBatch>, limit: u64) -> Vec<Vec<Part<'a>>> {
     let mut pages = vec![];
     let (mut page, mut room) = (vec![], limit);
-    for batch in &body.batches {
+    for batch in batches {
         let count = batch.law.info.constants.len() as u64;
         let widest = if batch.per_element { SLOT_BYTES.max(4 * count) } else { SLOT_BYTES };
         let mut start = 0;
@@ -352,21 +407,30 @@ impl Range {
     }
 }
 
+const DFORCE: Pass = |law| Some(&law.shaders.dforce);
+const DIAGONAL: Pass = |law| Some(&law.shaders.diagonal);
+const DDAMPING: Pass = |law| law.damping.map(|damping| &damping.shaders.ddamping);
+
+/// What damping binds of a displacement and a velocity.
+fn rate_at<'a>([u, v]: [&'a GpuVector; 2]) -> Bound<'a> {
+    Bound { displacement: Some(u.memory()), velocity: Some(v.memory()), ..Bound::default() }
+}
+
 impl ForceField<GpuBackend> for GpuField {
     fn element_energies(&mut self, backend: &GpuBackend, u: &GpuVector) -> Result<Vec<f64>, LeftDomain> {
-        let energies = self.output(u, |s| &s.energy, 1);
+        let energies = self.output(u, |law| Some(&law.shaders.energy), 1);
         self.inside(backend)?;
         Ok(energies)
     }
 
     fn cauchy(&mut self, _: &GpuBackend, u: &GpuVector) -> Vec<[f64; 9]> {
-        let values = self.output(u, |s| &s.cauchy, 9);
+        let values = self.output(u, |law| Some(&law.shaders.cauchy), 9);
         values.chunks_exact(9).map(|s| std::array::from_fn(|k| s[k])).collect()
     }
 
     fn add_force(&mut self, backend: &GpuBackend, u: &GpuVector, f: &mut GpuVector) -> Result<(), LeftDomain> {
         let bound = Bound { displacement: Some(u.memory()), ..Bound::default() };
-        self.passes(backend, |s| &s.force, &bound, 1.0, f);
+        self.passes(backend, (Of::All, |law| Some(&law.shaders.force)), &bound, 1.0, f);
         self.inside(backend)
     }
 
@@ -378,11 +442,41 @@ impl ForceField<GpuBackend> for GpuField {
 
     fn add_dforce(&mut self, backend: &GpuBackend, du: &GpuVector, factor: f64, df: &mut GpuVector) {
         let bound = Bound { increment: Some(du.memory()), ..Bound::default() };
-        self.passes(backend, |s| &s.dforce, &bound, factor, df);
+        self.passes(backend, (Of::All, DFORCE), &bound, factor, df);
     }
 
     fn add_diagonal(&mut self, backend: &GpuBackend, factor: f64, d: &mut GpuVector) {
-        self.passes(backend, |s| &s.diagonal, &Bound::default(), factor, d);
+        self.passes(backend, (Of::All, DIAGONAL), &Bound::default(), factor, d);
+    }
+
+    fn add_dforce_at(&mut self, backend: &GpuBackend, u: &GpuVector, du: &GpuVector, factor: f64, df: &mut GpuVector) {
+        let bound = Bound { displacement: Some(u.memory()), increment: Some(du.memory()), ..Bound::default() };
+        self.passes(backend, (Of::All, DFORCE), &bound, factor, df);
+    }
+
+    fn add_diagonal_at(&mut self, backend: &GpuBackend, u: &GpuVector, factor: f64, d: &mut GpuVector) {
+        let bound = Bound { displacement: Some(u.memory()), ..Bound::default() };
+        self.passes(backend, (Of::All, DIAGONAL), &bound, factor, d);
+    }
+
+    fn add_damping(&mut self, backend: &GpuBackend, at: [&GpuVector; 2], factor: f64, f: &mut GpuVector) {
+        self.passes(backend, (Of::Damped, |law| law.damping.map(|d| &d.shaders.damping)), &rate_at(at), factor, f);
+    }
+
+    fn add_ddamping(
+        &mut self,
+        backend: &GpuBackend,
+        at: [&GpuVector; 2],
+        dv: &GpuVector,
+        factor: f64,
+        df: &mut GpuVector,
+    ) {
+        let bound = Bound { increment: Some(dv.memory()), ..rate_at(at) };
+        self.passes(backend, (Of::Damped, DDAMPING), &bound, factor, df);
+    }
+
+    fn add_damping_diagonal(&mut self, backend: &GpuBackend, at: [&GpuVector; 2], factor: f64, d: &mut GpuVector) {
+        self.passes(backend, (Of::Damped, |law| law.damping.map(|d| &d.shaders.diagonal)), &rate_at(at), factor, d);
     }
 
     fn product(
@@ -394,25 +488,20 @@ impl ForceField<GpuBackend> for GpuField {
         registers: &mut GpuRegisters,
     ) {
         let bound = Bound { increment: Some(x.memory()), gate: Some(registers.memory()), ..Bound::default() };
-        let nodes = backend.nodes();
-        let groups = self.recorder.groups(nodes, self.work_group_size);
-        for page in 0..self.pages.len() {
-            self.element_passes(page, |s| &s.dforce, &bound);
-            let kernel = self.kernel(&NODE_PRODUCT, 0, "product at nodes");
-            // The slots hold -K x.
-            let factors = [-operator.stiffness, operator.mass].map(|f| (f as f32).to_bits());
-            let numbers = [nodes as u32, u32::from(page == 0), factors[0], factors[1]];
-            let storage = [
-                &self.slots,
-                &self.pages[page].offsets,
-                x.memory(),
-                operator.masses.memory(),
-                y.memory(),
-                backend.partials(),
-                registers.memory(),
-            ];
-            self.recorder.dispatch(&kernel, numbers, &storage, groups);
+        let (masses, vectors) = (operator.masses, [x, &*y]);
+        let first = (operator.stiffness, Some(operator.mass));
+        self.part_of_product(backend, (Of::All, DFORCE), &bound, first, masses, vectors);
+        if let Some(damping) = &operator.damping {
+            let [u, v] = [damping.u, damping.v].map(|vector| Some(vector.memory()));
+            let bound = Bound { displacement: u, velocity: v, ..bound };
+            for (factor, pass) in [(damping.viscosity, (Of::Damped, DDAMPING)), (damping.stiffness, (Of::All, DFORCE))]
+            {
+                if factor != 0.0 {
+                    self.part_of_product(backend, pass, &bound, (factor, None), masses, vectors);
+                }
+            }
         }
+        let groups = self.recorder.groups(backend.nodes(), self.work_group_size);
         backend.sum_is_pending(groups);
     }
 }

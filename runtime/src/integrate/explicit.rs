@@ -1,4 +1,7 @@
 //! Explicit steps: semi-implicit Euler and central differences.
+//!
+//! The elements' damping forces are those of the last velocity that is known, before the step or half a step before: the
+//! schemes stay explicit, and are of first order in these forces.
 
 use crate::backend::{Backend, ForceField};
 use crate::system::{Integrator, SolveError, State, StepReport, System};
@@ -27,6 +30,7 @@ impl<B: Backend> SemiImplicitEuler<B> {
 impl<B: Backend, F: ForceField<B>> Integrator<B, F> for SemiImplicitEuler<B> {
     fn step(&mut self, system: &mut System<B, F>, state: &mut State<B>, h: f64) -> Result<StepReport, SolveError> {
         system.force(&state.u, state.time, &mut self.force)?;
+        system.add_damping(&state.u, &state.v, &mut self.force);
         let backend = &system.backend;
         backend.divide(&self.force, &system.masses, &mut self.acceleration);
         // Damping -alpha M V at the beginning of the step.
@@ -66,6 +70,7 @@ impl<B: Backend> CentralDifference<B> {
 impl<B: Backend, F: ForceField<B>> Integrator<B, F> for CentralDifference<B> {
     fn step(&mut self, system: &mut System<B, F>, state: &mut State<B>, h: f64) -> Result<StepReport, SolveError> {
         system.force(&state.u, state.time, &mut self.force)?;
+        system.add_damping(&state.u, &state.v, &mut self.force);
         let alpha = system.body.mass_damping;
         let backend = &system.backend;
         backend.divide(&self.force, &system.masses, &mut self.acceleration);

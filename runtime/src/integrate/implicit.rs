@@ -1,13 +1,18 @@
 //! Implicit Euler (Faure et al. 2012, eqs. 18 to 20), linearised once or iterated to convergence.
+//!
+//! Damping forces of the elements are those of the velocity at the end of the step and of the strain at its beginning.
+//! They are then the derivative of h D by the velocity, so that each step still minimises a potential (its matrix is
+//! symmetric), and dissipate whatever the step; the lag is of the order of the scheme.
 
 use crate::backend::{Backend, ForceField};
 use crate::system::{Integrator, SolveError, State, StepReport, System};
 
 use super::newton::{Equation, Newton, SolverSettings};
 
-/// Implicit Euler: V+ = V + h M^-1 (F(U+) - alpha M V+), U+ = U + h V+.
+/// Implicit Euler: V+ = V + h M^-1 (F(U+) + F_v(U, V+) - (alpha M + beta K(U)) V+), U+ = U + h V+.
 ///
-/// In dV: ((1 + h alpha) M + h^2 K) dV = h (F - alpha M V) - h^2 K V, loads at the end of the step. With one Newton
+/// In dV: ((1 + h alpha) M + h (C + beta K) + h^2 K) dV = h (F + F_v - (alpha M + beta K) V) - h^2 K V with C = -dF_v/dV,
+/// loads at the end of the step. With one Newton
 /// iteration this is the paper's linearised step; with more, the nonlinear equation is solved.
 pub struct ImplicitEuler<B: Backend> {
     newton: Newton<B>,
@@ -46,6 +51,8 @@ impl<B: Backend, F: ForceField<B>> Integrator<B, F> for ImplicitEuler<B> {
             u: &state.u,
             velocity: Some(&state.v),
             constant: (alpha != 0.0).then_some(&self.damping),
+            viscous: system.body.is_viscous(),
+            stiffness_damping: system.body.stiffness_damping,
         };
         let report = self.newton.solve(system, &equation, &mut self.dv, &self.settings)?;
         let backend = &system.backend;

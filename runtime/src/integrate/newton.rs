@@ -4,7 +4,7 @@
 //! domain, or that makes the residual larger, is taken back by half until it does neither. Norms are those of
 //! D = diag A; a residual at the level of rounding is as good as converged and is reported as such.
 
-use crate::backend::{Backend, ForceField, LeftDomain, Operator};
+use crate::backend::{Backend, Damping, ForceField, LeftDomain, Operator};
 use crate::cg::{CgLimits, CgOutcome, CgReport, ConjugateGradient};
 use crate::scene::Preconditioner;
 use crate::system::{SolveError, StepReport, System};
@@ -40,7 +40,8 @@ const FORCING: (f64, f64) = (1e-3, 1e-2);
 const HALVINGS: u32 = 12;
 
 /// The equation of one implicit step: find x (imposed components given) with
-/// `force f(u_0 + displacement (x + v_0)) + constant - mass M x = 0` on the free components.
+/// `force (f(u_0 + displacement (x + v_0)) + d(u_0, x + v_0)) + constant - mass M x = 0` on the free components, where d
+/// are the elements' damping forces.
 pub(super) struct Equation<'a, B: Backend> {
     /// Factor of M in A and in the residual.
     pub mass: f64,
@@ -58,6 +59,10 @@ pub(super) struct Equation<'a, B: Backend> {
     pub velocity: Option<&'a B::Vector>,
     /// What the residual has besides forces and inertia.
     pub constant: Option<&'a B::Vector>,
+    /// Whether a law has a dissipation.
+    pub viscous: bool,
+    /// Rayleigh's beta.
+    pub stiffness_damping: f64,
 }
 
 impl<B: Backend> Equation<'_, B> {
@@ -70,15 +75,23 @@ impl<B: Backend> Equation<'_, B> {
         }
     }
 
-    /// The residual at displacement u and, where given, x; projected.
+    /// The residual at displacement u and, where given, x; projected. Without x it has no damping.
     fn residual<F: ForceField<B>>(
         &self,
         system: &mut System<B, F>,
         u: &B::Vector,
         x: Option<&B::Vector>,
+        damped: &mut Option<Damped<B>>,
         r: &mut B::Vector,
     ) -> Result<(), LeftDomain> {
         system.force(u, self.time, r)?;
+        if let (Some(x), Some(Damped { rate, .. })) = (x, damped) {
+            system.backend.copy(x, rate);
+            if let Some(v) = self.velocity {
+                system.backend.axpy(1.0, v, rate);
+            }
+            system.add_damping(self.u, rate, r);
+        }
         let backend = &system.backend;
         backend.scale(self.force, r);
         if let Some(constant) = self.constant {
@@ -92,8 +105,19 @@ impl<B: Backend> Equation<'_, B> {
     }
 }
 
+/// What the solver needs where elements damp.
+pub(super) struct Damped<B: Backend> {
+    /// The velocity at the current iterate.
+    rate: B::Vector,
+    /// The part of the diagonal that is the stiffness's.
+    elastic: B::Vector,
+    /// Whether the prepared K is that of u_0, so that Rayleigh's part needs no product of its own.
+    at_start: bool,
+}
+
 /// Work vectors of the implicit solvers.
 pub(super) struct Newton<B: Backend> {
+    damped: Option<Damped<B>>,
     cg: ConjugateGradient<B>,
     diagonal: B::Vector,
     ones: B::Vector,
@@ -108,6 +132,7 @@ pub(super) struct Newton<B: Backend> {
 impl<B: Backend> Newton<B> {
     pub fn new(backend: &B, nodes: usize) -> Self {
         Self {
+            damped: None,
             cg: ConjugateGradient::new(backend),
             diagonal: backend.zeros(),
             ones: backend.upload(&vec![[1.0; 3]; nodes]),
@@ -129,11 +154,15 @@ impl<B: Backend> Newton<B> {
         settings: &SolverSettings,
     ) -> Result<StepReport, SolveError> {
         let mut report = StepReport { forces: 1, ..StepReport::default() };
-        equation.residual(system, equation.u, None, &mut self.residual)?;
+        equation.residual(system, equation.u, None, &mut None, &mut self.residual)?;
         system.field.prepare(&system.backend, equation.u);
+        self.begin_damping(system, equation);
         if let Some(v) = equation.velocity {
-            // The linearised force at u_0 + displacement v_0.
-            let factor = equation.force * equation.displacement;
+            // The linearised force at u_0 + displacement v_0, with the damping of v_0.
+            let factor = equation.force * (equation.displacement + equation.stiffness_damping);
+            if equation.viscous {
+                system.field.add_damping(&system.backend, [equation.u, v], equation.force, &mut self.residual);
+            }
             system.field.add_dforce(&system.backend, v, factor, &mut self.residual);
             system.backend.project(&mut self.residual);
             report.products += 1;
@@ -162,7 +191,7 @@ impl<B: Backend> Newton<B> {
         let mut previous = reference;
         for iteration in 1.. {
             equation.displaced(&system.backend, x, &mut self.u);
-            equation.residual(system, &self.u, Some(x), &mut self.residual)?;
+            equation.residual(system, &self.u, Some(x), &mut self.damped, &mut self.residual)?;
             report.forces += 1;
             let norm = self.norm(&system.backend);
             // Textbook stresses err by a strain of one rounding unit over an element's edge.
@@ -180,6 +209,9 @@ impl<B: Backend> Newton<B> {
             let forcing = if exact { tightest } else { progress.min(FORCING.1).max(tightest).max(0.1 * wanted / norm) };
             previous = norm;
             system.field.prepare(&system.backend, &self.u);
+            if let Some(damped) = &mut self.damped {
+                damped.at_start = system.body.is_elastically_linear();
+            }
             self.diagonal(system, equation);
             system.backend.clear(&mut self.increment);
             account(&mut report, self.linear(system, equation, settings, forcing)?);
@@ -205,7 +237,7 @@ impl<B: Backend> Newton<B> {
             system.backend.axpy(length, &self.increment, &mut self.trial);
             equation.displaced(&system.backend, &self.trial, &mut self.u);
             report.forces += 1;
-            match equation.residual(system, &self.u, Some(&self.trial), &mut self.residual) {
+            match equation.residual(system, &self.u, Some(&self.trial), &mut self.damped, &mut self.residual) {
                 Ok(()) if self.norm(&system.backend) <= (1.0 - 1e-4 * length) * norm => {
                     system.backend.copy(&self.trial, x);
                     return Ok(());
@@ -223,15 +255,58 @@ impl<B: Backend> Newton<B> {
         }
     }
 
-    fn operator<'a, F: ForceField<B>>(system: &'a System<B, F>, equation: &Equation<B>) -> Operator<'a, B> {
-        Operator { masses: &system.masses, mass: equation.mass, stiffness: equation.stiffness }
+    /// The vectors that damping needs, if there is any, at x = 0.
+    fn begin_damping<F: ForceField<B>>(&mut self, system: &System<B, F>, equation: &Equation<B>) {
+        if !equation.viscous && equation.stiffness_damping == 0.0 {
+            self.damped = None;
+            return;
+        }
+        let backend = &system.backend;
+        let new = || Damped { rate: backend.zeros(), elastic: backend.zeros(), at_start: true };
+        let damped = self.damped.get_or_insert_with(new);
+        damped.at_start = true;
+        match equation.velocity {
+            Some(v) => backend.copy(v, &mut damped.rate),
+            None => backend.clear(&mut damped.rate),
+        }
+    }
+
+    /// A at the prepared state and the current rate.
+    fn operator<'a>(
+        masses: &'a B::Vector,
+        equation: &Equation<'a, B>,
+        damped: &'a Option<Damped<B>>,
+    ) -> Operator<'a, B> {
+        let (mass, mut stiffness) = (equation.mass, equation.stiffness);
+        let damping = damped.as_ref().and_then(|Damped { rate, at_start, .. }| {
+            let proportional = equation.force * equation.stiffness_damping;
+            let viscosity = if equation.viscous { equation.force } else { 0.0 };
+            stiffness += if *at_start { proportional } else { 0.0 };
+            let own = if *at_start { 0.0 } else { proportional };
+            let needed = viscosity != 0.0 || own != 0.0;
+            needed.then_some(Damping { u: equation.u, v: rate, viscosity, stiffness: own })
+        });
+        Operator { masses, mass, stiffness, damping }
     }
 
     /// D = diag A at the prepared state.
     fn diagonal<F: ForceField<B>>(&mut self, system: &mut System<B, F>, equation: &Equation<B>) {
-        let operator = Operator { masses: &system.masses, mass: equation.mass, stiffness: equation.stiffness };
-        operator.diagonal(&system.backend, &mut system.field, &mut self.diagonal);
-        system.backend.make_positive(&mut self.diagonal);
+        let (backend, field) = (&system.backend, &mut system.field);
+        let operator = Self::operator(&system.masses, equation, &self.damped);
+        let (stiffness, diagonal) = (operator.stiffness, &mut self.diagonal);
+        if self.damped.is_none() {
+            operator.diagonal(backend, field, diagonal);
+        } else {
+            backend.clear(diagonal);
+            operator.damping_diagonal(backend, field, diagonal);
+            backend.axpy(equation.mass, &system.masses, diagonal);
+            if let Some(Damped { elastic, .. }) = &mut self.damped {
+                backend.clear(elastic);
+                field.add_diagonal(backend, stiffness, elastic);
+                backend.axpy(1.0, elastic, diagonal);
+            }
+        }
+        backend.make_positive(diagonal);
     }
 
     /// Solves A increment = residual at the prepared state.
@@ -242,7 +317,7 @@ impl<B: Backend> Newton<B> {
         settings: &SolverSettings,
         tolerance: f64,
     ) -> Result<CgReport, SolveError> {
-        let operator = Operator { masses: &system.masses, mass: equation.mass, stiffness: equation.stiffness };
+        let operator = Self::operator(&system.masses, equation, &self.damped);
         let preconditioner = match settings.preconditioner {
             Preconditioner::Jacobi => &self.diagonal,
             Preconditioner::None => &self.ones,
@@ -266,7 +341,7 @@ impl<B: Backend> Newton<B> {
 
     /// The norm of residual - A x for x as given: imposed components only.
     fn imbalance<F: ForceField<B>>(&mut self, system: &mut System<B, F>, equation: &Equation<B>, x: &B::Vector) -> f64 {
-        let operator = Operator { masses: &system.masses, mass: equation.mass, stiffness: equation.stiffness };
+        let operator = Self::operator(&system.masses, equation, &self.damped);
         operator.apply(&system.backend, &mut system.field, x, &mut self.product);
         let of_residual = self.norm(&system.backend);
         system.backend.xpby(&self.residual, -1.0, &mut self.product);
@@ -282,14 +357,20 @@ impl<B: Backend> Newton<B> {
 
     /// What rounding alone leaves of the residual: of the forces K (u + offset).
     fn rounding<F: ForceField<B>>(&mut self, system: &System<B, F>, equation: &Equation<B>, offset: f64) -> f64 {
-        let operator = Self::operator(system, equation);
         let backend = &system.backend;
-        let Self { u, ones, product, scratch, diagonal, .. } = self;
+        let Self { u, ones, product, scratch, diagonal, damped, .. } = self;
+        let damped = &*damped;
+        let Operator { masses, mass, stiffness, .. } = Self::operator(&system.masses, equation, damped);
         let mut of = |x: &B::Vector| {
             // diag(K) x = (D - m M) x / k.
             backend.clear(product);
-            backend.multiply_add(1.0 / operator.stiffness, diagonal, x, product);
-            backend.multiply_add(-operator.mass / operator.stiffness, operator.masses, x, product);
+            match damped {
+                Some(Damped { elastic, .. }) => backend.multiply_add(1.0 / stiffness, elastic, x, product),
+                None => {
+                    backend.multiply_add(1.0 / stiffness, diagonal, x, product);
+                    backend.multiply_add(-mass / stiffness, masses, x, product);
+                }
+            }
             backend.project(product);
             backend.divide(product, diagonal, scratch);
             backend.dot(product, scratch).max(0.0).sqrt()

@@ -43,6 +43,8 @@ impl<B: Backend> Statics<B> {
             u: &state.u,
             velocity: None,
             constant: None,
+            viscous: false,
+            stiffness_damping: 0.0,
         };
         match self.newton.solve(system, &equation, &mut self.du, &self.settings) {
             Ok(report) => {

@@ -112,6 +112,7 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
         motions,
         loads,
         mass_damping: scene.solver.mass_damping * scale.time,
+        stiffness_damping: scene.solver.stiffness_damping / scale.time,
         diameter: diagonal / scale.length,
         volume: mesh.total_volume() / scale.length.powi(3),
     };

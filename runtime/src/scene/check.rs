@@ -54,8 +54,10 @@ pub(super) fn warnings(data: &SceneData, document: &Document) -> Vec<String> {
             warnings.push(format!("solver.{key} has no effect: the integrator is explicit"));
         }
     }
-    if still && solver.mass_damping != 0.0 {
-        warnings.push("solver.mass_damping has no effect: static equilibrium has no motion".to_owned());
+    for (key, value) in [("mass_damping", solver.mass_damping), ("stiffness_damping", solver.stiffness_damping)] {
+        if still && value != 0.0 {
+            warnings.push(format!("solver.{key} has no effect: static equilibrium has no motion"));
+        }
     }
     if still && data.initial.velocity != [0.0; 3] {
         warnings.push("initial.velocity has no effect: static equilibrium has no motion".to_owned());

@@ -405,10 +405,15 @@ pub struct Solver {
     /// The number type of state and kernels.
     #[serde(default)]
     pub precision: Precision,
-    /// Mass-proportional damping alpha in 1/s, from 0 to 1e9; `static` has none.
+    /// Mass-proportional damping alpha in 1/s, from 0 to 1e9; `static` has none. With `stiffness_damping`, Rayleigh's
+    /// C = alpha M + beta K.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1e9))]
     pub mass_damping: f64,
+    /// Stiffness-proportional damping beta in s, from 0 to 1e6; `static` has none.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub stiffness_damping: f64,
     /// The linear solver of `implicit-euler` and `static`.
     #[serde(default)]
     pub cg: ConjugateGradient,

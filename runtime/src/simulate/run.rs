@@ -188,6 +188,9 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         if needs.reactions {
             let mut f = self.system.backend.zeros();
             self.system.force(&self.state.u, self.state.time, &mut f)?;
+            if self.scene.solver.integrator != scene::Integrator::Static {
+                self.system.add_damping(&self.state.u, &self.state.v, &mut f);
+            }
             snapshot.reactions = self.in_si(&f, -scale.force());
         }
         if needs.energies {

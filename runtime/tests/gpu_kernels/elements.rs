@@ -20,6 +20,7 @@ fn of_batch(all: &[f64], kernel: Kernel, batch: &LawBatch) -> Vec<f64> {
         Kernel::Energy => 1,
         Kernel::Cauchy => 9,
         Kernel::Force | Kernel::DForce | Kernel::Diagonal => 12,
+        Kernel::Damping | Kernel::DDamping | Kernel::DampingDiagonal => 12,
     };
     batch.elements.iter().flat_map(|&e| &all[width * e as usize..][..width]).copied().collect()
 }
@@ -27,7 +28,7 @@ fn of_batch(all: &[f64], kernel: Kernel, batch: &LawBatch) -> Vec<f64> {
 fn check(gpu: &Arc<Gpu>, law: &'static LawEntry, analysis: &Analysis) {
     let Disjoint { body, u, du } = Disjoint::new(&[law], ELEMENTS, analysis, &mut Rng::new(1));
     let (mut cpu, mut gpu) = (on_cpu(&body), on_gpu(gpu, &body, GpuOptions::default()));
-    for kernel in KERNELS {
+    for kernel in KERNELS.into_iter().filter(|kernel| kernel.is_of(law)) {
         let (wanted, found) = (cpu.fresh(kernel, &u, &du), gpu.fresh(kernel, &u, &du));
         for batch in &body.batches {
             let materials = if batch.per_element { "a material each" } else { "one material" };

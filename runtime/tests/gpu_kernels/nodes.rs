@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tensormass_runtime::backend::{Backend, ForceField, Operator, REGISTERS, RUNNING, SUM, Scalar, Update};
+use tensormass_runtime::backend::{Backend, Damping, ForceField, Operator, REGISTERS, RUNNING, SUM, Scalar, Update};
 use tensormass_runtime::body::{Body, Constraint};
 use tensormass_runtime::gpu::{Gpu, GpuOptions};
 use tensormass_runtime::history::History;
@@ -17,9 +17,18 @@ use crate::{On, on_cpu, on_gpu};
 /// Bytes that divide the body into pages.
 const SMALL: u64 = 12 << 10;
 /// Factors of sums; numbers of f32.
-const FACTORS: [(Kernel, f64); 3] = [(Kernel::Force, 1.0), (Kernel::DForce, -0.75), (Kernel::Diagonal, 1.5)];
+const FACTORS: [(Kernel, f64); 6] = [
+    (Kernel::Force, 1.0),
+    (Kernel::DForce, -0.75),
+    (Kernel::Diagonal, 1.5),
+    (Kernel::Damping, 1.25),
+    (Kernel::DDamping, -0.5),
+    (Kernel::DampingDiagonal, 0.75),
+];
 /// Factors of the masses and of the stiffness.
 const OPERATOR: (f64, f64) = (3.25, 0.625);
+/// Factors of the viscosity, which brings its forces to the size of the others, and of the stiffness that damps.
+const DAMPING: (f64, f64) = (524_288.0, 0.375);
 /// Where the tests' update keeps the sum.
 const KEPT: usize = 7;
 
@@ -53,7 +62,7 @@ impl Shared {
     /// old + factor times the sum of each node's slots; bodies in `pages` add a sum a page.
     fn sums(&self, kernel: Kernel, factor: f64, analysis: &Analysis, pages: usize, old: &[Bound]) -> Vec<Bound> {
         let mut sums: Vec<Sum> = old.iter().map(|_| Sum::default()).collect();
-        for batch in &self.body.batches {
+        for batch in self.body.batches.iter().filter(|batch| kernel.is_of(batch.law)) {
             let values = analysis.batch(kernel, &self.body, batch, &self.u, &self.du);
             for (&e, slots) in batch.elements.iter().zip(values.chunks(12)) {
                 for (node, slot) in self.body.elements[e as usize].iter().zip(slots.chunks(3)) {
@@ -114,7 +123,12 @@ impl Update for Keep {
 }
 
 /// y = A x and x . y, where the solver runs; y before.
-fn product<B: Backend, F: ForceField<B>>(on: &mut On<B, F>, body: &Shared, running: f64) -> (Vec<f64>, f64) {
+fn product<B: Backend, F: ForceField<B>>(
+    on: &mut On<B, F>,
+    body: &Shared,
+    running: f64,
+    damped: bool,
+) -> (Vec<f64>, f64) {
     let On { backend, field } = on;
     let masses: Vector = body.body.masses.iter().map(|&m| [m, 2.0 * m, 4.0 * m]).collect();
     let (masses, x, mut y) = (backend.upload(&masses), backend.upload(&body.du), backend.upload(&body.old));
@@ -123,7 +137,9 @@ fn product<B: Backend, F: ForceField<B>>(on: &mut On<B, F>, body: &Shared, runni
     let mut registers = backend.registers(registers);
     let u = backend.upload(&body.u);
     field.prepare(backend, &u);
-    let operator = Operator { masses: &masses, mass: OPERATOR.0, stiffness: OPERATOR.1 };
+    let damping = Damping { u: &u, v: &x, viscosity: DAMPING.0, stiffness: DAMPING.1 };
+    let operator =
+        Operator { masses: &masses, mass: OPERATOR.0, stiffness: OPERATOR.1, damping: damped.then_some(damping) };
     field.product(backend, &operator, &x, &mut y, &mut registers);
     backend.update::<Keep>(&mut registers);
     let values = backend.download(&y).into_flattened();
@@ -159,25 +175,32 @@ fn check(gpu: &Arc<Gpu>, body: &Shared, options: GpuOptions, analysis: &Analysis
         println!("{what}: {:.3} of the bound", compare(&what, &found, &wanted, &bounds));
         all.push(found);
     }
-    let (wanted, _) = product(&mut cpu, body, 1.0);
-    let (found, dot) = product(&mut on, body, 1.0);
     let masses = body.body.masses.iter().flat_map(|&m| [m, 2.0 * m, 4.0 * m]).map(Bound::exact);
     let x: Vec<Bound> = body.du.iter().flatten().copied().map(Bound::exact).collect();
     let first: Vec<Bound> = masses.zip(&x).map(|(m, &x)| Bound::exact(OPERATOR.0) * m * x).collect();
     // Slots hold -K x.
-    let mut bounds = body.sums(Kernel::DForce, -OPERATOR.1, analysis, pages, &first);
-    let imposed = |k: &usize| body.is_imposed(*k);
-    (0..bounds.len()).filter(imposed).for_each(|k| bounds[k] = Bound::exact(0.0));
-    let what = format!("product, {pages} pages");
-    println!("{what}: {:.3} of the bound", compare(&what, &found, &wanted, &bounds));
-    // Of the product as it was found. A term is rounded as a product, meets two others of its node, then halves of its
-    // group, then the sums of groups.
-    let groups = body.body.masses.len().div_ceil(options.work_group_size as usize);
-    let depth = 1.0 + 2.0 + f64::from(options.work_group_size).log2() + groups.div_ceil(256) as f64 + 8.0;
-    let terms = || x.iter().zip(&found).map(|(x, y)| x.value * y);
-    let bound = Bound::new(terms().sum(), depth * terms().map(f64::abs).sum::<f64>());
-    println!("x . y, {what}: {:.3} of the bound", compare(&what, &[dot], &[bound.value], &[bound]));
-    all.extend([found, vec![dot]]);
+    let undamped = body.sums(Kernel::DForce, -OPERATOR.1, analysis, pages, &first);
+    for damped in [false, true] {
+        let (wanted, _) = product(&mut cpu, body, 1.0, damped);
+        let (found, dot) = product(&mut on, body, 1.0, damped);
+        let mut bounds = undamped.clone();
+        if damped {
+            bounds = body.sums(Kernel::DDamping, -DAMPING.0, analysis, pages, &bounds);
+            bounds = body.sums(Kernel::DForce, -DAMPING.1, analysis, pages, &bounds);
+        }
+        let imposed = |k: &usize| body.is_imposed(*k);
+        (0..bounds.len()).filter(imposed).for_each(|k| bounds[k] = Bound::exact(0.0));
+        let what = format!("product, damped {damped}, {pages} pages");
+        println!("{what}: {:.3} of the bound", compare(&what, &found, &wanted, &bounds));
+        // Of the product as it was found. A term is rounded as a product, meets two others of its node, then halves of its
+        // group, then the sums of groups.
+        let groups = body.body.masses.len().div_ceil(options.work_group_size as usize);
+        let depth = 1.0 + 2.0 + f64::from(options.work_group_size).log2() + groups.div_ceil(256) as f64 + 8.0;
+        let terms = || x.iter().zip(&found).map(|(x, y)| x.value * y);
+        let bound = Bound::new(terms().sum(), depth * terms().map(f64::abs).sum::<f64>());
+        println!("x . y, {what}: {:.3} of the bound", compare(&what, &[dot], &[bound.value], &[bound]));
+        all.extend([found, vec![dot]]);
+    }
     all
 }
 
@@ -198,7 +221,9 @@ fn a_solver_that_has_stopped_is_left_alone() {
     let body = Shared::new(6);
     for binding_bytes in [None, Some(SMALL)] {
         let mut on = on_gpu(&gpu, &body.body, GpuOptions { binding_bytes, ..GpuOptions::default() });
-        assert_eq!(product(&mut on, &body, 0.0).0, body.old.as_flattened());
+        for damped in [false, true] {
+            assert_eq!(product(&mut on, &body, 0.0, damped).0, body.old.as_flattened());
+        }
     }
 }
 

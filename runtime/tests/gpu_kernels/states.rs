@@ -49,6 +49,7 @@ pub fn body(elements: Vec<[u32; 4]>, rest: &[RestElement<f64>], batches: Vec<Law
         motions: vec![],
         loads: vec![],
         mass_damping: 0.0,
+        stiffness_damping: 0.0,
         diameter: 1.0,
         volume: rest.iter().map(|r| r.volume).sum(),
         elements,
@@ -153,10 +154,33 @@ pub enum Kernel {
     Diagonal,
     /// Cauchy stress: 9 numbers.
     Cauchy,
+    /// Damping forces at the nodes, the increment as velocity: 12 numbers.
+    Damping,
+    /// Their differentials at that velocity in its direction: 12 numbers.
+    DDamping,
+    /// Minus their diagonal at that velocity: 12 numbers.
+    DampingDiagonal,
+}
+
+impl Kernel {
+    /// Whether a law has it.
+    pub fn is_of(self, law: &LawEntry) -> bool {
+        let damps = matches!(self, Kernel::Damping | Kernel::DDamping | Kernel::DampingDiagonal);
+        law.damping.is_some() || !damps
+    }
 }
 
 /// Every kernel.
-pub const KERNELS: [Kernel; 5] = [Kernel::Energy, Kernel::Force, Kernel::DForce, Kernel::Diagonal, Kernel::Cauchy];
+pub const KERNELS: [Kernel; 8] = [
+    Kernel::Energy,
+    Kernel::Force,
+    Kernel::DForce,
+    Kernel::Diagonal,
+    Kernel::Cauchy,
+    Kernel::Damping,
+    Kernel::DDamping,
+    Kernel::DampingDiagonal,
+];
 
 /// The derivations of all laws, to be interpreted.
 pub struct Analysis {
@@ -216,21 +240,31 @@ impl Analysis {
             ];
             self.element.contract.interpret(&inputs).expect("the inputs of a contraction").remove(0)
         };
+        let rate = self.gradient(nodes, du, &shape);
+        if matches!(kernel, Kernel::Damping | Kernel::DDamping | Kernel::DampingDiagonal) {
+            inputs.push((Input::GradientRate, rate.as_slice()));
+        }
         match kernel {
             Kernel::Energy => vec![first("energy", &inputs)[0] * volume],
+            Kernel::Damping => contract(first("damping", &inputs)),
+            Kernel::DDamping => {
+                inputs.push((Input::GradientIncrement, rate.as_slice()));
+                contract(first("ddamping", &inputs))
+            }
             Kernel::Force => contract(first("force", &inputs)),
             Kernel::DForce => {
                 let dg = self.gradient(nodes, du, &shape);
                 inputs.push((Input::GradientIncrement, dg.as_slice()));
                 contract(first("dforce", &inputs))
             }
-            Kernel::Diagonal => {
+            Kernel::Diagonal | Kernel::DampingDiagonal => {
+                let name = if kernel == Kernel::Diagonal { "diagonal" } else { "damping_diagonal" };
                 let shape = [(Input::ShapeGradients, shape.as_slice())];
                 let n = self.element.node_gradients.interpret(&shape).expect("shape gradients").remove(0);
                 let node = |n| {
                     let mut inputs = inputs.clone();
                     inputs.push((Input::NodeGradient, n));
-                    first("diagonal", &inputs).into_iter().map(|d| volume * d)
+                    first(name, &inputs).into_iter().map(|d| volume * d)
                 };
                 n.chunks(3).flat_map(node).collect()
             }

@@ -115,6 +115,20 @@ pub fn parameters(law: &LawEntry) -> Vec<f64> {
     law.info.parameters.iter().flat_map(|p| p.default.map_or_else(|| one(p), <[f64]>::to_vec)).collect()
 }
 
+/// The parameters of [`parameters`], with viscosities (Pa s) of this size instead of its own, the k-th k times as large.
+pub fn viscous(law: &LawEntry, viscosity: f64) -> Vec<f64> {
+    let mut values = parameters(law);
+    let (mut first, mut k) = (0, 0);
+    for p in law.info.parameters {
+        if p.dimensions == [0, 1, 1] {
+            k += 1;
+            values[first..first + p.len].fill(f64::from(k) * viscosity);
+        }
+        first += p.len;
+    }
+    values
+}
+
 /// The laws that tests/reference/cases.json has, and its names of them.
 pub const REFERENCE: [(&str, &str); 6] = [
     ("hooke", "hooke"),
@@ -185,6 +199,7 @@ pub fn body(mesh: &TetMesh, law: &'static LawEntry, parameters: &[f64], imposed:
         motions: imposed.iter().map(|&(_, _, value)| History::constant(value)).collect(),
         loads: vec![],
         mass_damping: 0.0,
+        stiffness_damping: 0.0,
         diameter: (0..3).map(|i| (high[i] - low[i]).powi(2)).sum::<f64>().sqrt(),
         volume: mesh.total_volume(),
     }

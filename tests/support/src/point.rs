@@ -3,7 +3,7 @@
 use tensormass_codegen::derivation::Derivation;
 use tensormass_codegen::ir::{Input, Op, Output, ValidKernel};
 use tensormass_kernels::batch::{Batch, RestElement};
-use tensormass_kernels::{BatchKernels, LawEntry, Real};
+use tensormass_kernels::{BatchKernels, DampingKernels, LawEntry, Real};
 
 use crate::random::Rng;
 use crate::rounding::Rounded;
@@ -18,13 +18,19 @@ pub const NODE_GRADIENTS: [[f64; 3]; 4] = [[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], 
 #[derive(Debug)]
 pub struct Compiled<R: Real> {
     kernels: BatchKernels<R>,
+    damping: Option<DampingKernels<R>>,
     constants: Vec<R>,
 }
 
 impl<R: Real> Compiled<R> {
     /// Kernels with these constants, rounded to the working precision.
     pub fn new(kernels: BatchKernels<R>, constants: &[f64]) -> Self {
-        Self { kernels, constants: constants.iter().map(|&c| R::from_f64(c)).collect() }
+        Self { kernels, damping: None, constants: constants.iter().map(|&c| R::from_f64(c)).collect() }
+    }
+
+    /// The same with the kernels of the law's damping, if it has a dissipation.
+    pub fn with_damping(self, damping: Option<DampingKernels<R>>) -> Self {
+        Self { damping, ..self }
     }
 
     fn on_batch<T>(&self, f: impl FnOnce(&BatchKernels<R>, &Batch<R>) -> T) -> T {
@@ -79,6 +85,39 @@ impl<R: Real> Compiled<R> {
         let mut s = [[R::from_f64(0.0); 9]];
         self.on_batch(|k, b| (k.cauchy)(b, &Self::displacements(g), &mut s));
         s[0]
+    }
+
+    fn damping_kernels(&self) -> &DampingKernels<R> {
+        self.damping.as_ref().expect("the law has a dissipation")
+    }
+
+    /// D at G and its rate, of a law with a dissipation.
+    pub fn dissipation(&self, g: &[R; 9], rate: &[R; 9]) -> R {
+        let (u, v, mut d) = (Self::displacements(g), Self::displacements(rate), [R::from_f64(0.0)]);
+        self.on_batch(|_, b| (self.damping_kernels().dissipation)(b, &u, &v, &mut d));
+        d[0]
+    }
+
+    /// P_v at G and its rate.
+    pub fn damping(&self, g: &[R; 9], rate: &[R; 9]) -> [R; 9] {
+        let (u, v, mut f) = (Self::displacements(g), Self::displacements(rate), Self::zeros());
+        self.on_batch(|_, b| (self.damping_kernels().damping)(b, &u, &v, &mut f));
+        Self::stress(&f[0])
+    }
+
+    /// dP_v at G and its rate, where the rate changes by dG.
+    pub fn ddamping(&self, g: &[R; 9], rate: &[R; 9], dg: &[R; 9]) -> [R; 9] {
+        let (u, v, dv) = (Self::displacements(g), Self::displacements(rate), Self::displacements(dg));
+        let mut f = Self::zeros();
+        self.on_batch(|_, b| (self.damping_kernels().ddamping)(b, &u, &v, &dv, &mut f));
+        Self::stress(&f[0])
+    }
+
+    /// The diagonal of dP_v for each of [`NODE_GRADIENTS`].
+    pub fn damping_diagonal(&self, g: &[R; 9], rate: &[R; 9]) -> [[R; 3]; 4] {
+        let (u, v, mut d) = (Self::displacements(g), Self::displacements(rate), Self::zeros());
+        self.on_batch(|_, b| (self.damping_kernels().diagonal)(b, &u, &v, &mut d));
+        d[0]
     }
 }
 
@@ -140,8 +179,8 @@ impl Point {
         // In f32 the constants are rounded once more.
         let bounds = material.expect("one value a parameter component").remove(0).into_iter();
         let constants = bounds.zip(&values).map(|(b, &v)| Rounded::new(v, b.error + v.abs())).collect::<Vec<_>>();
-        let double = Compiled::new((entry.f64)(), &values);
-        let single = Compiled::new((entry.f32)(), &values);
+        let double = Compiled::new((entry.f64)(), &values).with_damping(entry.damping.map(|d| (d.f64)()));
+        let single = Compiled::new((entry.f32)(), &values).with_damping(entry.damping.map(|d| (d.f32)()));
         let comparisons = comparisons(&derivation);
         Self { entry, derivation, parameters, rounded, double, single, constants, comparisons }
     }
@@ -202,6 +241,38 @@ impl Point {
     pub fn cauchy(&self, g: &Matrix) -> Matrix {
         let bounds = self.bounds("cauchy", &[(Input::DisplacementGradient, g)]);
         self.bounded(self.double.cauchy(&tensor::values(g)), &bounds[0])
+    }
+
+    /// D at G and its rate, of a law with a dissipation.
+    pub fn dissipation(&self, g: &Matrix, rate: &Matrix) -> Rounded {
+        let bounds = self.bounds("dissipation", &[(Input::DisplacementGradient, g), (Input::GradientRate, rate)]);
+        self.bounded([self.double.dissipation(&tensor::values(g), &tensor::values(rate))], &bounds[0])[0]
+    }
+
+    /// P_v.
+    pub fn damping(&self, g: &Matrix, rate: &Matrix) -> Matrix {
+        let bounds = self.bounds("damping", &[(Input::DisplacementGradient, g), (Input::GradientRate, rate)]);
+        self.bounded(self.double.damping(&tensor::values(g), &tensor::values(rate)), &bounds[0])
+    }
+
+    /// dP_v where the rate changes by dG.
+    pub fn ddamping(&self, g: &Matrix, rate: &Matrix, dg: &Matrix) -> Matrix {
+        let inputs: [(Input, &[Rounded]); 3] =
+            [(Input::DisplacementGradient, g), (Input::GradientRate, rate), (Input::GradientIncrement, dg)];
+        let bounds = self.bounds("ddamping", &inputs);
+        let [g, rate, dg] = [g, rate, dg].map(tensor::values);
+        self.bounded(self.double.ddamping(&g, &rate, &dg), &bounds[0])
+    }
+
+    /// The diagonal of dP_v for each of [`NODE_GRADIENTS`].
+    pub fn damping_diagonal(&self, g: &Matrix, rate: &Matrix) -> [[Rounded; 3]; 4] {
+        let values = self.double.damping_diagonal(&tensor::values(g), &tensor::values(rate));
+        std::array::from_fn(|n| {
+            let node = NODE_GRADIENTS[n].map(Rounded::exact);
+            let inputs: [(Input, &[Rounded]); 3] =
+                [(Input::DisplacementGradient, g), (Input::GradientRate, rate), (Input::NodeGradient, &node)];
+            self.bounded(values[n], &self.bounds("damping_diagonal", &inputs)[0])
+        })
     }
 
     /// Which branch each selection of the force kernel takes.

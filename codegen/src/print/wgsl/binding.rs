@@ -10,6 +10,7 @@ pub enum Binding {
     Rest,
     Constants,
     Displacement,
+    Velocity,
     Increment,
     Slots,
     SlotIndex,
@@ -25,13 +26,14 @@ pub enum Binding {
 }
 
 /// Every binding, for tests and for the names that no value may take.
-pub const BINDINGS: [Binding; 18] = [
+pub const BINDINGS: [Binding; 19] = [
     Binding::ElementPass,
     Binding::NodePass,
     Binding::Nodes,
     Binding::Rest,
     Binding::Constants,
     Binding::Displacement,
+    Binding::Velocity,
     Binding::Increment,
     Binding::Slots,
     Binding::SlotIndex,
@@ -65,6 +67,7 @@ impl Binding {
             Self::Rest => (READ, "rest", "array<vec4<f32>>"),
             Self::Constants => (READ, "constants", "array<f32>"),
             Self::Displacement => (READ, "displacement", "array<vec4<f32>>"),
+            Self::Velocity => (READ, "velocity", "array<vec4<f32>>"),
             Self::Increment => (READ, "increment", "array<vec4<f32>>"),
             Self::Slots => (WRITTEN, "slots", "array<vec4<f32>>"),
             Self::SlotIndex => (READ, "slot_index", "array<vec4<u32>>"),
@@ -115,7 +118,7 @@ pub fn declarations(bindings: &[Binding]) -> String {
             Binding::Nodes | Binding::Rest | Binding::Constants | Binding::Displacement | Binding::Increment => {}
             Binding::Slots | Binding::SlotIndex | Binding::Offsets | Binding::Margins | Binding::Energies => {}
             Binding::Stresses | Binding::Gate | Binding::Sum | Binding::Masses | Binding::Product => {}
-            Binding::Partials => {}
+            Binding::Velocity | Binding::Partials => {}
         }
     }
     for (i, b) in bindings.iter().enumerate() {

@@ -93,6 +93,7 @@ pub fn field(role: Output) -> &'static str {
         Output::StressIncrement => "dp",
         Output::Diagonal => "d",
         Output::Cauchy => "sigma",
+        Output::DissipationDensity => "d",
         Output::DomainMargin => "margin",
         Output::NearRest => "near",
         Output::DisplacementGradient => "g",
@@ -145,7 +146,7 @@ pub fn helpers(kernel: &ValidKernel) -> impl Iterator<Item = Helper> {
 
 fn is_number(role: Output) -> bool {
     match role {
-        Output::EnergyDensity | Output::DomainMargin | Output::NearRest => true,
+        Output::EnergyDensity | Output::DissipationDensity | Output::DomainMargin | Output::NearRest => true,
         Output::Constants | Output::Stress | Output::StressIncrement | Output::Diagonal | Output::Cauchy => false,
         Output::DisplacementGradient | Output::NodalForce | Output::NodeGradients => false,
     }

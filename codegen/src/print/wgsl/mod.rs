@@ -15,7 +15,7 @@ use proc_macro2::{Literal, TokenStream};
 use quote::{format_ident, quote};
 
 pub use binding::Binding;
-pub use element::{NAMES, law_shaders};
+pub use element::{DAMPING_NAMES, NAMES, damping_shaders, law_shaders};
 pub use helpers::all as helper_functions;
 pub use nodes::{node_product, node_sum};
 pub use words::is_free;
@@ -52,6 +52,13 @@ pub fn law_expression(shaders: &[Shader; 5]) -> TokenStream {
     let names = NAMES.map(|name| format_ident!("{name}"));
     let shaders = shaders.each_ref().map(expression);
     quote!(::tensormass_kernels::shader::LawShaders { #(#names: #shaders),* })
+}
+
+/// The shaders of a law's damping as a Rust expression of the kernels crate's `DampingShaders`.
+pub fn damping_expression(shaders: &[Shader; 3]) -> TokenStream {
+    let names = ["damping", "ddamping", "diagonal"].map(|name| format_ident!("{name}"));
+    let shaders = shaders.each_ref().map(expression);
+    quote!(::tensormass_kernels::shader::DampingShaders { #(#names: #shaders),* })
 }
 
 /// A string literal that shows its lines; the text has no carriage return ([`comment`] lets none through).

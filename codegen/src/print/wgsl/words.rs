@@ -34,7 +34,8 @@ const LANGUAGE: &str = "
 /// Functions and variables of the texts around a kernel, except bindings and helpers, which say their own names.
 const OURS: &str = "
     work_group_size elements_per_invocation constants_stride main element group groups local shape_gradients nodal_displacement
-    nodal_increment gradient contract node_gradients energy force dforce diagonal cauchy e volume slot node point near far";
+    nodal_increment nodal_velocity gradient contract node_gradients energy force dforce diagonal cauchy damping ddamping
+    damping_diagonal e volume slot node point near far";
 
 /// Whether a value may have this name.
 pub fn is_free(name: &str) -> bool {
