@@ -12,7 +12,7 @@ mod law;
 mod real;
 pub mod shader;
 
-pub use law::{BatchKernels, Law, LawEntry, LawInfo, LawSource, Operations, ParameterInfo, Structure};
+pub use law::{Acceptance, BatchKernels, Law, LawEntry, LawInfo, LawSource, Operations, ParameterInfo, Structure};
 pub use real::Real;
 
 /// The kernels printed by the generator for this build.

@@ -91,6 +91,8 @@ pub struct Extremes {
     pub plain: Option<Plain>,
     /// What computed the WGSL.
     pub wgsl: Adapter,
+    /// What the law's author vouches for, and the kernels rely on.
+    pub accepted: Vec<String>,
 }
 
 /// What computed the WGSL, or why nothing did.
@@ -213,7 +215,8 @@ pub fn extremes(
     let machines = [Machine::F32, Machine::F64, Machine::Wgsl];
     let machines = &machines[..if matches!(wgsl, Adapter::Device(_)) { 3 } else { 2 }];
     let cells = tally.cells(machines, &places);
-    Ok(Extremes { law: subject.name().to_string(), materials, cells, rest, plain, wgsl })
+    let accepted = crate::explain::accepted(&subject.law);
+    Ok(Extremes { law: subject.name().to_string(), materials, cells, rest, plain, wgsl, accepted })
 }
 
 /// The states of one cell in f32 and f64.

@@ -8,6 +8,7 @@
 mod differential;
 mod energy;
 mod fibre;
+mod place;
 mod rest;
 mod spectral;
 mod strain;
@@ -18,7 +19,8 @@ use crate::cas::{Cas, UnexpectedTerm};
 use crate::derivation::Derivation;
 use crate::expr::{Expr, Symbol};
 use crate::ir::{Input, InvalidKernel, KernelIr, Output, Rational};
-use crate::law::ast::Law;
+use crate::law::LawError;
+use crate::law::ast::{Law, Scalar};
 use crate::lower::{Constants, Lowering};
 use crate::quantity::{Kind, Quantities, Value};
 use crate::split::{Rest, SplitError};
@@ -42,6 +44,9 @@ pub enum DeriveError {
     /// The law uses something that this version cannot differentiate.
     #[error("{0}")]
     Unsupported(String),
+    /// What is wrong with the law, and where.
+    #[error(transparent)]
+    Law(Box<LawError>),
 }
 
 /// Differentiates a law.
@@ -49,7 +54,8 @@ pub enum DeriveError {
 /// # Errors
 /// See [`DeriveError`].
 pub fn derive(law: &Law) -> Result<Derivation, DeriveError> {
-    Session::new(law)?.derivation(law)
+    let derived = Session::new(law, &[]).and_then(|(session, _)| session.derivation(law));
+    derived.map_err(|error| place::placed(law, error))
 }
 
 struct Session {
@@ -67,7 +73,8 @@ struct Session {
 }
 
 impl Session {
-    fn new(law: &Law) -> Result<Self, DeriveError> {
+    /// Reads the law, and `others` of its expressions.
+    fn new(law: &Law, others: &[Scalar]) -> Result<(Self, Vec<Expr>), DeriveError> {
         let mut cas = Cas::new();
         let mut quantities = Quantities::default();
         let mut strain = Strain::new(&mut quantities);
@@ -80,6 +87,7 @@ impl Session {
             }
             None => None,
         };
+        let others = others.iter().map(|e| reader.scalar(e)).collect::<Result<Vec<Expr>, _>>()?;
         let ranges = reader.ranges(law);
         let conditions = std::mem::take(&mut reader.conditions);
         reader.far_from_rest();
@@ -87,17 +95,18 @@ impl Session {
         let far_energy = cas.normalize(&far_energy)?;
         let margin = margin.map(|m| cas.normalize(&m)).transpose()?;
         let energy = cas.normalize(&energy)?;
-        Ok(Self {
+        let session = Self {
             cas,
             quantities,
             constants: Constants::default(),
             strain,
             energy,
             margin,
-            rest: Rest::new(ranges),
+            rest: Rest::new(ranges, &law.acceptances),
             far_energy,
             conditions,
-        })
+        };
+        Ok((session, others))
     }
 
     fn derivation(mut self, law: &Law) -> Result<Derivation, DeriveError> {
@@ -163,6 +172,9 @@ impl Session {
         for mut kernel in point {
             kernel.inputs.insert(0, (Input::Constants, count));
             kernels.push(kernel.validate()?);
+        }
+        if let Some(unused) = self.rest.unused() {
+            return Err(place::unused(law, unused));
         }
         Ok(Derivation {
             law: law.name.clone(),

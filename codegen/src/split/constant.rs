@@ -8,6 +8,7 @@ use num_traits::{Signed, ToPrimitive, Zero};
 use crate::cas::{Cas, UnexpectedTerm};
 use crate::expr::{Expr, Rational, Symbol};
 use crate::ir::Number;
+use crate::law::ast::{Acceptance, Accepted};
 use crate::quantity::{Kind, Quantities, Value};
 
 /// What is known of constants: the parameters' ranges, and what was simplified before.
@@ -15,6 +16,10 @@ use crate::quantity::{Kind, Quantities, Value};
 pub struct Constants {
     ranges: HashMap<Symbol, (f64, f64)>,
     simple: HashMap<Expr, Expr>,
+    /// What the law's author vouches for, and whether it was needed.
+    accepted: Vec<(Acceptance, bool)>,
+    /// Whether what seems to be 0 counts as such: constants of the stress are made of those that were accepted in the energy.
+    trusting: bool,
 }
 
 /// A closed interval that holds every value that an expression takes.
@@ -25,8 +30,27 @@ const PROBES: [f64; 3] = [0.314_159, 0.577_216, 0.836_207];
 
 impl Constants {
     /// Constants over parameters with these ranges.
-    pub fn new(ranges: HashMap<Symbol, (f64, f64)>) -> Self {
-        Self { ranges, simple: HashMap::new() }
+    pub fn new(ranges: HashMap<Symbol, (f64, f64)>, accepted: &[Acceptance]) -> Self {
+        let accepted = accepted.iter().map(|a| (a.clone(), false)).collect();
+        Self { ranges, accepted, ..Self::default() }
+    }
+
+    /// The first acceptance that nothing needed.
+    pub fn unused(&self) -> Option<&Acceptance> {
+        self.accepted.iter().find(|(_, used)| !used).map(|(a, _)| a)
+    }
+
+    /// Whether the author vouches for this of the constant.
+    pub fn accepts(&mut self, kind: Accepted, quantities: &Quantities, e: &Expr) -> bool {
+        let bare = |text: &str| text.split_whitespace().collect::<String>();
+        let text = bare(&crate::print::expression(e, quantities));
+        let found = self.accepted.iter_mut().find(|(a, _)| a.kind == kind && bare(&a.constant) == text);
+        if let Some((_, used)) = found {
+            *used = true;
+            self.trusting |= kind == Accepted::Cancellation;
+            return true;
+        }
+        false
     }
 
     /// The shortest equal form found by writing out named constants one after the other; the number 0 where the
@@ -60,7 +84,8 @@ impl Constants {
         if !matches!(best, Expr::Number(_)) && self.seems_zero(quantities, &written) {
             let common = cas.together(&written)?;
             let common = cas.expand(&common)?;
-            if common.is_zero() || cas.expand(&numerator(&common))?.is_zero() {
+            let shown = common.is_zero() || cas.expand(&numerator(&common))?.is_zero();
+            if shown || self.trusting || self.accepts(Accepted::Cancellation, quantities, &best) {
                 best = Expr::int(0);
             }
         }
@@ -69,7 +94,7 @@ impl Constants {
     }
 
     /// Whether the constant is 0, to rounding, at a few materials.
-    fn seems_zero(&self, quantities: &Quantities, e: &Expr) -> bool {
+    pub fn seems_zero(&self, quantities: &Quantities, e: &Expr) -> bool {
         PROBES.iter().all(|t| {
             let at = |s: Symbol, k: usize| {
                 let (low, high) = self.ranges.get(&s).copied().unwrap_or((0.5, 2.0));

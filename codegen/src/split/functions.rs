@@ -80,11 +80,7 @@ impl Splitter<'_> {
                 &format!("is undefined at rest: what it is taken of is {} there, which is negative", self.text(rest)),
                 "check the formula against its source",
             ),
-            None => self.refuse(
-                e,
-                &format!("is taken of {} at rest, whose sign the declared ranges leave open", self.text(rest)),
-                "narrow a parameter's `#[range(..)]` so that the sign is decided",
-            ),
+            None => self.require_sign(e, "is taken of", rest),
         }
     }
 }

@@ -31,6 +31,7 @@ use std::collections::HashMap;
 use crate::cas::{Cas, UnexpectedTerm};
 use crate::derivation::Rewrite;
 use crate::expr::{Expr, Symbol};
+use crate::law::ast::{Acceptance, Accepted};
 use crate::quantity::{Kind, Quantities, Value};
 
 use constant::Constants;
@@ -54,10 +55,36 @@ pub enum SplitError {
     },
     /// The stress at rest is not zero.
     #[error(
-        "the stress at rest is not zero: the energy density begins with {0}, of first order in the strain; add the term \
+        "the stress at rest is not zero: the energy density begins with `{0}`, of first order in the strain; add the term \
          that cancels it"
     )]
     StressAtRest(String),
+    /// The stress at rest is zero as far as numbers show, and the constant that says so does not cancel.
+    #[error("the stress at rest seems to be zero, but that `{0}` cancels cannot be shown; {remedy}", remedy = cancel(.0))]
+    Cancellation(String),
+}
+
+impl SplitError {
+    /// What is wrong, and what the author can do; `None` for what is no fault of the law.
+    pub fn parts(&self) -> Option<(String, String)> {
+        match self {
+            Self::Cas(_) => None,
+            Self::Term { term, reason, remedy } => Some((format!("the term `{term}` {reason}"), remedy.clone())),
+            Self::StressAtRest(_) | Self::Cancellation(_) => {
+                let text = self.to_string();
+                let (reason, remedy) = text.split_once("; ").unwrap_or((&text, ""));
+                Some((reason.to_owned(), remedy.to_owned()))
+            }
+        }
+    }
+}
+
+/// The remedy for a constant of which numbers say that it is 0.
+fn cancel(constant: &str) -> String {
+    format!(
+        "write the constant so that it cancels term by term, or say why it is 0: `#[accept(cancellation = \"{constant}\", \
+         reason = \"..\")]`"
+    )
 }
 
 /// A value as its constant at rest and its change since.
@@ -111,9 +138,14 @@ pub struct Rest {
 }
 
 impl Rest {
-    /// For parameters with these ranges.
-    pub fn new(ranges: HashMap<Symbol, (f64, f64)>) -> Self {
-        Self { constants: Constants::new(ranges), rewrites: vec![] }
+    /// For parameters with these ranges, and what the law's author vouches for.
+    pub fn new(ranges: HashMap<Symbol, (f64, f64)>, accepted: &[Acceptance]) -> Self {
+        Self { constants: Constants::new(ranges, accepted), rewrites: vec![] }
+    }
+
+    /// The first acceptance that nothing needed.
+    pub fn unused(&self) -> Option<&Acceptance> {
+        self.constants.unused()
     }
 }
 
@@ -151,7 +183,7 @@ impl<'a> Splitter<'a> {
         let split = self.part(e)?;
         match &split.jump {
             Some(Jump { term, reason }) => {
-                self.refuse(term, reason, "let the branches agree where the condition changes")
+                self.refuse(term, reason, "let the branches agree where the condition changes, or narrow the ranges so that it is decided at rest")
             }
             None => Ok(split),
         }
@@ -192,11 +224,6 @@ impl<'a> Splitter<'a> {
         let difference = self.split(&(left.clone() - right.clone()))?;
         let threshold = self.simplify(Expr::int(-1) * difference.rest)?;
         Ok(difference.rewritten.0.then_some((difference.change, threshold)))
-    }
-
-    /// An expression as text.
-    pub fn print(&self, e: &Expr) -> String {
-        self.text(e)
     }
 
     fn constant(&mut self, e: Expr) -> Result<Split, SplitError> {
@@ -242,6 +269,30 @@ impl<'a> Splitter<'a> {
         let rewrite = Rewrite { kernel: self.kernel.to_string(), term, rest, form };
         if !self.rest.rewrites.contains(&rewrite) {
             self.rest.rewrites.push(rewrite);
+        }
+    }
+
+    /// Refuses a term that depends on the sign of a constant which is open, unless the author vouches for it.
+    fn require_sign(&mut self, term: &Expr, does: &str, constant: &Expr) -> Result<(), SplitError> {
+        if self.rest.constants.accepts(Accepted::Sign, self.quantities, constant) {
+            return Ok(());
+        }
+        let constant = self.text(constant);
+        let remedy = format!(
+            "narrow a parameter's `#[range(..)]` so that the sign is decided, or say why it is: `#[accept(sign = \
+             \"{constant}\", reason = \"..\")]`"
+        );
+        let reason = format!("{does} `{constant}` at rest, whose sign the declared ranges leave open");
+        self.refuse(term, &reason, &remedy)
+    }
+
+    /// The refusal of a stress at rest, which begins with `e`.
+    pub fn stressed(&self, e: &Expr, constants: &[Expr]) -> SplitError {
+        match constants.iter().find(|c| self.rest.constants.seems_zero(self.quantities, c)) {
+            Some(c) if constants.iter().all(|c| self.rest.constants.seems_zero(self.quantities, c)) => {
+                SplitError::Cancellation(self.text(c))
+            }
+            _ => SplitError::StressAtRest(self.text(e)),
         }
     }
 
