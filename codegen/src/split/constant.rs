@@ -11,6 +11,8 @@ use crate::ir::Number;
 use crate::law::ast::{Acceptance, Accepted};
 use crate::quantity::{Kind, Quantities, Value};
 
+use super::roots::canonical;
+
 /// What is known of constants: the parameters' ranges, and what was simplified before.
 #[derive(Debug, Default)]
 pub struct Constants {
@@ -66,7 +68,7 @@ impl Constants {
             return Ok(known.clone());
         }
         let mut best = cas.normalize(&e)?;
-        let mut written = cas.expand(&e)?;
+        let mut written = expanded(cas, &e)?;
         loop {
             if size(&written) < size(&best) {
                 best = written.clone();
@@ -77,7 +79,7 @@ impl Constants {
                 _ => None,
             });
             match latest {
-                Some((s, value)) => written = cas.expand(&replace(&written, s, &value))?,
+                Some((s, value)) => written = expanded(cas, &replace(&written, s, &value))?,
                 None => break,
             }
         }
@@ -228,6 +230,31 @@ fn size(e: &Expr) -> usize {
         Expr::Ln(a) | Expr::Exp(a) => 2 + size(a),
         Expr::Log1p(a) | Expr::Expm1(a) | Expr::Log1pmx(a) | Expr::Expm1mx(a) => 2 + size(a),
     }
+}
+
+/// The expression written out, within functions too, and with powers of numbers in one form.
+fn expanded(cas: &mut Cas, e: &Expr) -> Result<Expr, UnexpectedTerm> {
+    let within = canonical(&inside(cas, e)?);
+    let once = canonical(&cas.expand(&within)?);
+    // What is in one form now may cancel now.
+    cas.expand(&once)
+}
+
+/// The expression with the arguments of its functions written out.
+fn inside(cas: &mut Cas, e: &Expr) -> Result<Expr, UnexpectedTerm> {
+    Ok(match e {
+        Expr::Number(_) | Expr::Symbol(_) => e.clone(),
+        Expr::Sum(xs) => Expr::Sum(xs.iter().map(|x| inside(cas, x)).collect::<Result<_, _>>()?),
+        Expr::Product(xs) => Expr::Product(xs.iter().map(|x| inside(cas, x)).collect::<Result<_, _>>()?),
+        Expr::Power(a, b) => {
+            // An integer power of a sum is written out with the rest.
+            let a = if matches!(**b, Expr::Number(q) if q.is_integer()) { inside(cas, a)? } else { expanded(cas, a)? };
+            Expr::Power(Box::new(a), Box::new(inside(cas, b)?))
+        }
+        Expr::Ln(a) => Expr::Ln(Box::new(expanded(cas, a)?)),
+        Expr::Exp(a) => Expr::Exp(Box::new(expanded(cas, a)?)),
+        Expr::Log1p(_) | Expr::Expm1(_) | Expr::Log1pmx(_) | Expr::Expm1mx(_) => e.clone(),
+    })
 }
 
 fn replace(e: &Expr, s: Symbol, by: &Expr) -> Expr {

@@ -24,6 +24,7 @@ mod constant;
 mod functions;
 mod powers;
 mod product;
+mod roots;
 mod second;
 
 use std::collections::HashMap;
