@@ -29,6 +29,8 @@ type Interval = (f64, f64);
 
 /// Materials at which a constant that may be zero is evaluated: positions within each parameter's range.
 const PROBES: [f64; 3] = [0.314_159, 0.577_216, 0.836_207];
+/// Constants that are numbers are multiples of 1 over this.
+const SIMPLE: f64 = 12.0;
 
 impl Constants {
     /// Constants over parameters with these ranges.
@@ -84,27 +86,49 @@ impl Constants {
             }
         }
         if !matches!(best, Expr::Number(_)) && self.seems_zero(quantities, &written) {
-            let common = cas.together(&written)?;
-            let common = cas.expand(&common)?;
-            let shown = common.is_zero() || cas.expand(&numerator(&common))?.is_zero();
-            if shown || self.trusting || self.accepts(Accepted::Cancellation, quantities, &best) {
+            let vouched = |of: &mut Self| of.trusting || of.accepts(Accepted::Cancellation, quantities, &best);
+            if vanishes(cas, &written)? || self.is_near_zero(quantities, &written) && vouched(self) {
                 best = Expr::int(0);
             }
+        }
+        if !matches!(best, Expr::Number(_))
+            && let Some(q) = self.seems_number(quantities, &written)
+            && vanishes(cas, &(written.clone() - Expr::Number(q)))?
+        {
+            best = Expr::Number(q);
         }
         self.simple.insert(e, best.clone());
         Ok(best)
     }
 
-    /// Whether the constant is 0, to rounding, at a few materials.
-    pub fn seems_zero(&self, quantities: &Quantities, e: &Expr) -> bool {
-        PROBES.iter().all(|t| {
+    /// As `seems_zero`, and finite.
+    pub fn is_near_zero(&self, quantities: &Quantities, e: &Expr) -> bool {
+        self.seems_zero(quantities, e) && self.probed(quantities, e).all(|(value, _)| value.is_finite())
+    }
+
+    /// Whether the constant is 0, to rounding, or infinite at a few materials.
+    fn seems_zero(&self, quantities: &Quantities, e: &Expr) -> bool {
+        self.probed(quantities, e).all(|(value, magnitude)| !value.is_finite() || value.abs() <= 1e-9 * magnitude)
+    }
+
+    /// The simple number other than 0 that the constant is, to rounding, at a few materials.
+    fn seems_number(&self, quantities: &Quantities, e: &Expr) -> Option<Rational> {
+        let mut values = self.probed(quantities, e).map(|(value, _)| value);
+        let first = values.next().filter(|value| value.is_finite() && value.abs() < 1e6)?;
+        let near = |value: f64| (value - first).abs() <= 1e-9 * first.abs();
+        let q = Rational::new((first * SIMPLE).round() as i128, SIMPLE as i128);
+        (values.all(near) && !q.is_zero() && near(<f64 as Number>::from_rational(q))).then_some(q)
+    }
+
+    /// The value at each of a few materials, and the sum of the magnitudes of what was added to it.
+    fn probed<'a>(&'a self, quantities: &'a Quantities, e: &'a Expr) -> impl Iterator<Item = (f64, f64)> + 'a {
+        PROBES.iter().map(|t| {
             let at = |s: Symbol, k: usize| {
                 let (low, high) = self.ranges.get(&s).copied().unwrap_or((0.5, 2.0));
                 let t = (t + 0.618_034 * k as f64).fract();
                 if low > 0.0 { low * (high / low).powf(t) } else { low + (high - low) * t }
             };
-            let (value, magnitude) = evaluate(quantities, e, &at);
-            !value.is_finite() || value.abs() <= 1e-9 * magnitude
+            evaluate(quantities, e, &at)
         })
     }
 
@@ -203,6 +227,13 @@ fn evaluate(quantities: &Quantities, e: &Expr, at: &impl Fn(Symbol, usize) -> f6
         Expr::Expm1(a) => exactly(of(a).0.exp_m1()),
         Expr::Log1pmx(_) | Expr::Expm1mx(_) => (f64::NAN, f64::NAN),
     }
+}
+
+/// Whether the constant is 0 on one denominator.
+fn vanishes(cas: &mut Cas, e: &Expr) -> Result<bool, UnexpectedTerm> {
+    let common = cas.together(e)?;
+    let common = cas.expand(&common)?;
+    Ok(common.is_zero() || cas.expand(&numerator(&common))?.is_zero())
 }
 
 /// What a quotient has above: the factors that are no negative powers.

@@ -289,8 +289,8 @@ impl<'a> Splitter<'a> {
 
     /// The refusal of a stress at rest, which begins with `e`.
     pub fn stressed(&self, e: &Expr, constants: &[Expr]) -> SplitError {
-        match constants.iter().find(|c| self.rest.constants.seems_zero(self.quantities, c)) {
-            Some(c) if constants.iter().all(|c| self.rest.constants.seems_zero(self.quantities, c)) => {
+        match constants.iter().find(|c| self.rest.constants.is_near_zero(self.quantities, c)) {
+            Some(c) if constants.iter().all(|c| self.rest.constants.is_near_zero(self.quantities, c)) => {
                 SplitError::Cancellation(self.text(c))
             }
             _ => SplitError::StressAtRest(self.text(e)),
