@@ -68,6 +68,8 @@ struct Session {
     rest: Rest,
     /// The energy in C instead of C - I.
     far_energy: Expr,
+    /// The domain's margin in C: where a body is compressed to almost nothing, 3 + tr A loses tr C.
+    far_margin: Option<Expr>,
     /// The comparisons of the law's selections.
     conditions: Vec<(Expr, Expr)>,
 }
@@ -92,7 +94,12 @@ impl Session {
         let conditions = std::mem::take(&mut reader.conditions);
         reader.far_from_rest();
         let far_energy = reader.scalar(&law.energy)?;
+        let far_margin = match &law.domain {
+            Some(domain) => Some(reader.scalar(&domain.left)? - reader.scalar(&domain.right)?),
+            None => None,
+        };
         let far_energy = cas.normalize(&far_energy)?;
+        let far_margin = far_margin.map(|m| cas.normalize(&m)).transpose()?;
         let margin = margin.map(|m| cas.normalize(&m)).transpose()?;
         let energy = cas.normalize(&energy)?;
         let session = Self {
@@ -104,6 +111,7 @@ impl Session {
             margin,
             rest: Rest::new(ranges, &law.acceptances),
             far_energy,
+            far_margin,
             conditions,
         };
         Ok((session, others))
@@ -138,12 +146,12 @@ impl Session {
                 point.push(self.lower(
                     "energy_far",
                     &[G],
-                    with_margin(Output::EnergyDensity, vec![far_energy], &margin),
+                    with_margin(Output::EnergyDensity, vec![far_energy], &self.far_margin.clone()),
                 ));
             }
             None => point.push(self.lower("energy", &[G], with_margin(Output::EnergyDensity, vec![energy], &margin))),
         }
-        let far_margin = margin.clone();
+        let far_margin = self.far_margin.clone();
         match &near_stress {
             Some(near) => {
                 let mut outputs = with_margin(Output::Stress, near.stress.to_vec(), &near.margin);

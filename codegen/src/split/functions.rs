@@ -73,7 +73,7 @@ impl Splitter<'_> {
                 "write the law so that the term is smooth at rest",
             );
         }
-        match self.rest.constants.is_positive(self.quantities, rest) {
+        match self.sign(rest)? {
             Some(true) => Ok(()),
             Some(false) => self.refuse(
                 e,

@@ -273,6 +273,16 @@ impl<'a> Splitter<'a> {
         }
     }
 
+    /// Whether the constant is positive (`true`) or negative (`false`) for every material; `None` if that is open.
+    fn sign(&mut self, constant: &Expr) -> Result<Option<bool>, SplitError> {
+        if let Some(sign) = self.rest.constants.is_positive(self.quantities, constant) {
+            return Ok(Some(sign));
+        }
+        // Written out, a power of a difference hides its sign: (j - 1)^3.
+        let factored = self.cas.factor(constant)?;
+        Ok(self.rest.constants.is_positive(self.quantities, &factored))
+    }
+
     /// Refuses a term that depends on the sign of a constant which is open, unless the author vouches for it.
     fn require_sign(&mut self, term: &Expr, does: &str, constant: &Expr) -> Result<(), SplitError> {
         if self.rest.constants.accepts(Accepted::Sign, self.quantities, constant) {
@@ -429,7 +439,7 @@ impl<'a> Splitter<'a> {
         let difference = self.simplify(then_.rest.clone() - otherwise_.rest.clone())?;
         let name = self.quantities.get(s).name.clone();
         // At rest the condition compares 0 with the threshold.
-        let decided = self.rest.constants.is_positive(self.quantities, &threshold).map(|positive| !positive);
+        let decided = self.sign(&threshold)?.map(|positive| !positive);
         let (rest, then_change, otherwise_change) = if difference.is_zero() {
             (then_.rest.clone(), then_.change.clone(), otherwise_.change.clone())
         } else {

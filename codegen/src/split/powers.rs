@@ -123,7 +123,7 @@ impl Splitter<'_> {
                 "write the law so that the term is smooth at rest",
             );
         }
-        if self.rest.constants.is_positive(self.quantities, &a.rest).is_none() {
+        if self.sign(&a.rest)?.is_none() {
             self.require_sign(e, "divides by", &a.rest)?;
         }
         Ok(())
