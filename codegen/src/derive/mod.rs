@@ -7,6 +7,7 @@
 
 mod differential;
 mod energy;
+mod far;
 mod fibre;
 mod place;
 mod rest;
@@ -129,7 +130,8 @@ impl Session {
         let (near_energy, at_rest) = self.near_energy()?;
         let near_stress = self.near_stress(&stress)?;
         let from_rest = |e: Expr| if at_rest.is_zero() { e } else { e - at_rest.clone() };
-        let (energy, far_energy) = (from_rest(energy), from_rest(self.far_energy.clone()));
+        let energy = from_rest(energy);
+        let far_energy = self.far_from(self.far_energy.clone(), &at_rest)?;
 
         use Input::{DisplacementGradient as G, GradientIncrement, NodeGradient};
         let mut point = Vec::new();

@@ -144,6 +144,14 @@ impl Rest {
         Self { constants: Constants::new(ranges, accepted), rewrites: vec![] }
     }
 
+    /// A constant simplified: see [`Constants::simplify`].
+    ///
+    /// # Errors
+    /// The computer algebra system answered in unknown terms.
+    pub fn simplify(&mut self, cas: &mut Cas, quantities: &Quantities, e: Expr) -> Result<Expr, UnexpectedTerm> {
+        self.constants.simplify(cas, quantities, e)
+    }
+
     /// The first acceptance that nothing needed.
     pub fn unused(&self) -> Option<&Acceptance> {
         self.constants.unused()
