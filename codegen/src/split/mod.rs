@@ -21,11 +21,13 @@
 //! was rewritten says where it holds (`NearRest`), and has a sibling for elsewhere.
 
 mod constant;
+mod error;
 mod functions;
 mod powers;
 mod product;
 mod roots;
 mod second;
+mod select;
 
 use std::collections::HashMap;
 
@@ -36,57 +38,8 @@ use crate::law::ast::{Acceptance, Accepted};
 use crate::quantity::{Kind, Quantities, Value};
 
 use constant::Constants;
+pub use error::SplitError;
 pub use second::{Leaves, Second};
-
-/// Why a law cannot be split at rest.
-#[derive(Debug, thiserror::Error)]
-pub enum SplitError {
-    /// The computer algebra system answered in unknown terms.
-    #[error(transparent)]
-    Cas(#[from] UnexpectedTerm),
-    /// A term has no expansion at rest, or none that is decided for every material.
-    #[error("the term `{term}` {reason}; {remedy}")]
-    Term {
-        /// The term, as text.
-        term: String,
-        /// What is wrong with it.
-        reason: String,
-        /// What the author can do.
-        remedy: String,
-    },
-    /// The stress at rest is not zero.
-    #[error(
-        "the stress at rest is not zero: the energy density begins with `{0}`, of first order in the strain; add the term \
-         that cancels it"
-    )]
-    StressAtRest(String),
-    /// The stress at rest is zero as far as numbers show, and the constant that says so does not cancel.
-    #[error("the stress at rest seems to be zero, but that `{0}` cancels cannot be shown; {remedy}", remedy = cancel(.0))]
-    Cancellation(String),
-}
-
-impl SplitError {
-    /// What is wrong, and what the author can do; `None` for what is no fault of the law.
-    pub fn parts(&self) -> Option<(String, String)> {
-        match self {
-            Self::Cas(_) => None,
-            Self::Term { term, reason, remedy } => Some((format!("the term `{term}` {reason}"), remedy.clone())),
-            Self::StressAtRest(_) | Self::Cancellation(_) => {
-                let text = self.to_string();
-                let (reason, remedy) = text.split_once("; ").unwrap_or((&text, ""));
-                Some((reason.to_owned(), remedy.to_owned()))
-            }
-        }
-    }
-}
-
-/// The remedy for a constant of which numbers say that it is 0.
-fn cancel(constant: &str) -> String {
-    format!(
-        "write the constant so that it cancels term by term, or say why it is 0: `#[accept(cancellation = \"{constant}\", \
-         reason = \"..\")]`"
-    )
-}
 
 /// A value as its constant at rest and its change since.
 #[derive(Debug, Clone)]
@@ -433,88 +386,6 @@ impl<'a> Splitter<'a> {
             self.note_split(e, &split);
         }
         Ok(split)
-    }
-
-    /// A choice: both branches have to have the same constant at rest, unless the condition is decided there.
-    fn select(&mut self, s: Symbol, parts: [&Expr; 4]) -> Result<Split, SplitError> {
-        let [left, right, then, otherwise] = parts;
-        let condition = self.split(&(left.clone() - right.clone()))?;
-        let (then_, otherwise_) = (self.part(then)?, self.part(otherwise)?);
-        if let Some(jump) = then_.jump.clone().or_else(|| otherwise_.jump.clone()) {
-            return Ok(self.jumping(s.into(), jump));
-        }
-        let threshold = self.simplify(Expr::int(-1) * condition.rest.clone())?;
-        let difference = self.simplify(then_.rest.clone() - otherwise_.rest.clone())?;
-        let name = self.quantities.get(s).name.clone();
-        // At rest the condition compares 0 with the threshold.
-        let decided = self.sign(&threshold)?.map(|positive| !positive);
-        let (rest, then_change, otherwise_change) = if difference.is_zero() {
-            (then_.rest.clone(), then_.change.clone(), otherwise_.change.clone())
-        } else {
-            match decided {
-                Some(true) => (then_.rest.clone(), then_.change.clone(), otherwise_.value.clone() - then_.rest.clone()),
-                Some(false) => {
-                    (otherwise_.rest.clone(), then_.value.clone() - otherwise_.rest.clone(), otherwise_.change.clone())
-                }
-                None => {
-                    let (then, otherwise) = (self.text(&then_.rest), self.text(&otherwise_.rest));
-                    let reason =
-                        format!("jumps at rest from {otherwise} to {then}, and which of the two counts is open");
-                    let left = condition.change;
-                    let (then, otherwise) = (then_.value, otherwise_.value);
-                    let value = Value::Select { left, right: threshold, then, otherwise };
-                    let value = self.quantities.add(name, Kind::Stage { value, partials: None });
-                    return Ok(self.jumping(value.into(), Jump { term: s.into(), reason }));
-                }
-            }
-        };
-        let rewritten =
-            (condition.rewritten.0 || !condition.rest.is_zero() || then_.rewritten.0 || otherwise_.rewritten.0, false);
-        let choose = |splitter: &mut Self, name: String, then: Expr, otherwise: Expr| -> Expr {
-            if then == otherwise {
-                return then;
-            }
-            let value = Value::Select { left: condition.change.clone(), right: threshold.clone(), then, otherwise };
-            splitter.quantities.add(name, Kind::Stage { value, partials: None }).into()
-        };
-        let second = match (then_.second, otherwise_.second) {
-            (Some(a), Some(b)) if difference.is_zero() && a.linear == b.linear => {
-                let remainder = choose(self, format!("{name}_remainder"), a.remainder, b.remainder);
-                let order = a.order.min(b.order);
-                Some(Second { linear: a.linear, remainder, order, is_whole: a.is_whole && b.is_whole })
-            }
-            (Some(a), Some(b)) => {
-                // A decided condition takes one branch in a neighbourhood of rest.
-                let taken = match decided {
-                    Some(true) => Some(a),
-                    Some(false) => Some(b),
-                    None => None,
-                };
-                match taken {
-                    Some(near) => {
-                        let linear = near.linear.clone();
-                        let form = near.linear_form();
-                        let then = then_change.clone() - form.clone();
-                        let otherwise = otherwise_change.clone() - form;
-                        let (then, otherwise) = match decided {
-                            Some(true) => (near.remainder.clone(), otherwise),
-                            _ => (then, near.remainder.clone()),
-                        };
-                        let remainder = choose(self, format!("{name}_remainder"), then, otherwise);
-                        Some(Second { linear, remainder, order: near.order, is_whole: false })
-                    }
-                    None => {
-                        let change =
-                            choose(self, format!("{name}_change"), then_change.clone(), otherwise_change.clone());
-                        Some(Second::of_first_order(change))
-                    }
-                }
-            }
-            _ => None,
-        };
-        let change = choose(self, format!("{name}_change"), then_change, otherwise_change);
-        let value = rest.clone() + change.clone();
-        Ok(Split { rest, change, value, rewritten, second, jump: None })
     }
 }
 
