@@ -4,6 +4,11 @@
 //! Journal of the Mechanics and Physics of Solids 41, 1993, doi:10.1016/0022-5096(93)90013-6, for incompressible
 //! rubber; here with I1bar for I1, and a quadratic penalty as the volumetric part.
 #[domain(J > 0.0)]
+#[small_strain_moduli(
+    shear = c_r * (1.0 + 3.0 / (5.0 * n) + 99.0 / (175.0 * n.powi(2)) + 513.0 / (875.0 * n.powi(3))
+        + 42039.0 / (67375.0 * n.powi(4))),
+    bulk = kappa
+)]
 struct Parameters {
     /// Rubbery modulus C_R: chain density times Boltzmann's constant times temperature.
     #[unit("Pa")] #[range(1e0, 1e12)] c_r: f64,

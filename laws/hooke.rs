@@ -2,6 +2,7 @@
 //! Faure, Zara, Jaillet & Moreau, An Implicit Tensor-Mass Solver on the GPU for Soft Bodies Simulation, VRIPHYS 2012,
 //! eq. 9.
 #[small_strain]
+#[small_strain_moduli(shear = shear_modulus(young, poisson), bulk = bulk_modulus(young, poisson))]
 struct Parameters {
     /// Young's modulus.
     #[unit("Pa")] #[range(1e0, 1e12)] young: f64,

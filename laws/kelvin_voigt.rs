@@ -3,6 +3,7 @@
 //! Spring: Bonet & Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed., eq. 6.27. Dashpot: Landau &
 //! Lifshitz, Theory of Elasticity, 3rd ed., eqs. 34.5 and 34.6, in E for the small strain, so that rotation is free.
 #[domain(J > 0.0)]
+#[small_strain_moduli(shear = shear_modulus(young, poisson), bulk = bulk_modulus(young, poisson))]
 struct Parameters {
     /// Young's modulus.
     #[unit("Pa")] #[range(1e0, 1e12)] young: f64,

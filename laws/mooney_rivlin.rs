@@ -2,6 +2,7 @@
 //! Holzapfel, Nonlinear Solid Mechanics, 2000, eq. 6.147, with lambda/2 (ln J)^2 for its c (J - 1)^2; mu1 and mu2 are
 //! twice its c1 and c2. Small strains have the shear modulus mu1 + mu2 and the first Lame constant lambda + 2 mu2.
 #[domain(J > 0.0)]
+#[small_strain_moduli(shear = mu1 + mu2, lame_lambda = lambda + 2.0 * mu2)]
 struct Parameters {
     /// First Mooney-Rivlin constant.
     #[unit("Pa")] #[range(1e0, 1e12)] mu1: f64,

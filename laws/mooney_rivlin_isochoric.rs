@@ -4,6 +4,7 @@
 //! Transactions of the Royal Society A 241, 1948, doi:10.1098/rsta.1948.0024; the split is that of Holzapfel, Nonlinear
 //! Solid Mechanics, 2000, section 6.4.
 #[domain(J > 0.0)]
+#[small_strain_moduli(shear = 2.0 * (c10 + c01), bulk = kappa)]
 struct Parameters {
     /// First Mooney-Rivlin constant; twice the sum of both is the shear modulus.
     #[unit("Pa")] #[range(1e0, 1e12)] c10: f64,

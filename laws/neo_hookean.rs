@@ -1,6 +1,7 @@
 //! Compressible neo-Hookean solid with a logarithmic volumetric term.
 //! Bonet & Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed., eq. 6.27.
 #[domain(J > 0.0)]
+#[small_strain_moduli(shear = shear_modulus(young, poisson), bulk = bulk_modulus(young, poisson))]
 struct Parameters {
     /// Young's modulus.
     #[unit("Pa")] #[range(1e0, 1e12)] young: f64,

@@ -2,6 +2,7 @@
 //! Li, Guo, Liu, Wang & Qin, A GPU-Accelerated Finite Element Solver for Simulation of Soft-Body Deformation, 2014,
 //! after Taylor, Cheng & Ourselin, IEEE Transactions on Medical Imaging 27(5), 2008.
 #[domain(J > 0.0)]
+#[small_strain_moduli(shear = shear_modulus(young, poisson), bulk = bulk_modulus(young, poisson))]
 struct Parameters {
     /// Young's modulus.
     #[unit("Pa")] #[range(1e0, 1e12)] young: f64,

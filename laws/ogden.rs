@@ -8,6 +8,10 @@
 //! The shear modulus at rest is half the sum of mu_p alpha_p. Terms with a positive and with a negative exponent are
 //! parameters apart, so that the range of neither holds 0, where mu/alpha is infinite. A term with mu = 0 is left out.
 #[domain(J > 0.0)]
+#[small_strain_moduli(
+    shear = (mu[0] * alpha[0] + mu[1] * alpha[1] + mu_negative * alpha_negative) / 2.0,
+    bulk = kappa
+)]
 struct Parameters {
     /// Moduli of the terms with positive exponents.
     #[unit("Pa")] #[range(0.0, 1e12)] #[default(6.3e5, 0.012e5)] mu: [f64; 2],

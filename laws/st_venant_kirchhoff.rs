@@ -1,6 +1,7 @@
 //! St. Venant-Kirchhoff solid: Hooke's law in the Green strain, W = lambda/2 tr(E)^2 + mu E:E.
 //! Faure, Zara, Jaillet & Moreau, An Implicit Tensor-Mass Solver on the GPU for Soft Bodies Simulation, VRIPHYS 2012,
 //! eq. 10.
+#[small_strain_moduli(shear = shear_modulus(young, poisson), bulk = bulk_modulus(young, poisson))]
 struct Parameters {
     /// Young's modulus.
     #[unit("Pa")] #[range(1e0, 1e12)] young: f64,

@@ -3,6 +3,7 @@
 //! Yeoh, Some Forms of the Strain Energy Function for Rubber, Rubber Chemistry and Technology 66, 1993,
 //! doi:10.5254/1.3538343, for incompressible rubber; the volumetric part is a quadratic penalty.
 #[domain(J > 0.0)]
+#[small_strain_moduli(shear = 2.0 * c10, bulk = kappa)]
 struct Parameters {
     /// First constant, half the shear modulus.
     #[unit("Pa")] #[range(1e0, 1e12)] c10: f64,

@@ -105,6 +105,7 @@ fn show_prints_what_json_has() {
         let shows = |what: &str| assert!(page.contains(what), "`law show {name}` lacks `{what}`:\n{page}");
         text(&law, "docs").lines().for_each(|line| shows(line.trim()));
         shows(law["domain"].as_str().unwrap_or("everywhere"));
+        shows(law["moduli"].as_str().unwrap_or("not declared"));
         for parameter in law["parameters"].as_array().expect("an array") {
             ["name", "unit", "docs"].iter().for_each(|key| shows(text(parameter, key).trim()));
         }

@@ -52,6 +52,29 @@ fn extremes_passes_or_fails_by_the_gate() {
     assert!(law["cells"].as_array().is_some_and(|c| c.iter().any(|c| c["gate"].as_f64() > Some(1e5))));
 }
 
+/// What extremes prints above the gate is a command, and gives the same number again.
+#[test]
+fn replay_shows_a_state_again() {
+    let (text, _) = check(3, &["extremes", LOSSY, "--samples", "1", "--device", "cpu"]);
+    let (failure, line) = (text.find("above the gate: P in f32: "), text.find("tensormass law replay "));
+    let times = text[failure.expect("a failure") + 26..].split(' ').next().expect("a number");
+    let line = text[line.expect("a command") + 15..].lines().next().expect("a line");
+    let arguments: Vec<&str> = line.split_whitespace().collect();
+    let (text, error) = check(3, &[&arguments[..], &["--json"]].concat());
+    assert!(error.starts_with("error: above the gate: P in f32"), "{error}");
+    let rows = json(&text);
+    let row = rows.as_array().expect("a list").iter().find(|r| r["machine"] == "f32" && r["quantity"] == "P");
+    let gate = row.and_then(|r| r["gate"].as_f64()).expect("a number");
+    assert_eq!(format!("{gate:.3e}"), times);
+    let (text, _) = check(3, &arguments);
+    assert!(text.contains("quantity  in") && text.contains(" only "), "{text}");
+    let few = check(2, &["replay", LINEAR, "--gradient=1,2"]).1;
+    assert!(few.contains("--gradient has 2 numbers"), "{few}");
+    let outside = check(2, &["replay", "neo_hookean", "--gradient=-2,0,0,0,0,0,0,0,0"]).1;
+    assert!(outside.contains("J > 0.0"), "{outside}");
+    check(0, &["replay", "neo_hookean", "--set", "poisson=0.3", "--gradient=1e-3,0,0,0,-1e-4,0,0,2e-3,0"]);
+}
+
 #[test]
 fn check_lists_findings() {
     let (text, _) = check(0, &["check", LINEAR, "--samples", "1", "--device", "cpu"]);

@@ -123,6 +123,15 @@ impl Cas {
         self.expr(atom.as_view())
     }
 
+    /// The expression as a product of factors that cannot be divided further.
+    ///
+    /// # Errors
+    /// The system answered in terms that have no meaning here.
+    pub fn factor(&mut self, e: &Expr) -> Result<Expr, UnexpectedTerm> {
+        let atom = self.atom(e)?.factor();
+        self.expr(atom.as_view())
+    }
+
     /// The partial derivative by a symbol, every other symbol held.
     ///
     /// # Errors

@@ -73,15 +73,23 @@ pub fn run_if_requested() {
 fn work(job: &str) -> Result<(), String> {
     let mut lines = job.lines();
     let out = PathBuf::from(lines.next().unwrap_or_default());
-    for path in lines {
-        let text = std::fs::read_to_string(path).map_err(|e| format!("{path}: {e}"))?;
-        let law = crate::law::parse(path, &text)
-            .map_err(|errors| errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))?;
-        let derivation = crate::derive::derive(&law).map_err(|e| format!("{path}: {e}"))?;
-        let target = out.join(format!("{}.ir", law.name));
-        std::fs::write(&target, derivation.to_text()).map_err(|e| format!("{}: {e}", target.display()))?;
-    }
-    Ok(())
+    // Every law is tried, so that one run names the faults of all.
+    let refused: Vec<String> = lines.filter_map(|path| work_on(path, &out).err()).collect();
+    if refused.is_empty() { Ok(()) } else { Err(refused.join("\n")) }
+}
+
+#[cfg(feature = "derive")]
+fn work_on(path: &str, out: &Path) -> Result<(), String> {
+    let text = std::fs::read_to_string(path).map_err(|e| format!("{path}: {e}"))?;
+    let law = crate::law::parse(path, &text)
+        .map_err(|errors| errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))?;
+    let derivation = crate::derive::derive(&law).map_err(|e| match e {
+        // It says where.
+        crate::derive::DeriveError::Law(e) => e.to_string(),
+        e => format!("{path}: {e}"),
+    })?;
+    let target = out.join(format!("{}.ir", law.name));
+    std::fs::write(&target, derivation.to_text()).map_err(|e| format!("{}: {e}", target.display()))
 }
 
 #[cfg(not(feature = "derive"))]

@@ -91,6 +91,17 @@ impl Operations {
     }
 }
 
+/// What a law's author says of a constant at rest that the generator cannot decide.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Acceptance {
+    /// `sign`: it is decided for every material in use; `cancellation`: the constant is 0.
+    pub kind: &'static str,
+    /// The constant, an expression in the parameters.
+    pub constant: &'static str,
+    /// Why it is right.
+    pub reason: &'static str,
+}
+
 /// A law's metadata.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LawInfo {
@@ -104,6 +115,10 @@ pub struct LawInfo {
     pub domain: Option<&'static str>,
     /// Whether the law is one of small strains, which changes under rotation.
     pub small_strain: bool,
+    /// The moduli of small strains as the law file declares them.
+    pub moduli: Option<&'static str>,
+    /// What the law's author vouches for.
+    pub accepted: &'static [Acceptance],
     /// The material's constants as expressions in the parameters, for the reader.
     pub constants: &'static [&'static str],
     /// Detected structure.

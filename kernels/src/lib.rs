@@ -14,7 +14,7 @@ mod real;
 pub mod shader;
 
 pub use damping::{DampingEntry, DampingKernels, Dissipative};
-pub use law::{BatchKernels, Law, LawEntry, LawInfo, LawSource, Operations, ParameterInfo, Structure};
+pub use law::{Acceptance, BatchKernels, Law, LawEntry, LawInfo, LawSource, Operations, ParameterInfo, Structure};
 pub use real::Real;
 // Generated text computes constants in it.
 #[doc(hidden)]

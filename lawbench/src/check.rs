@@ -2,13 +2,15 @@
 
 use rayon::prelude::*;
 use serde::Serialize;
-use tensormass_codegen::ir::Number;
+use tensormass_codegen::ir::{Number, Rational};
+use tensormass_codegen::law::ast::{Law, Scalar};
+use tensormass_codegen::law::evaluate;
 
 use crate::edge::edge;
-use crate::exact::{ExactLaw, exact};
+use crate::exact::{ExactLaw, difference, exact};
 use crate::extremes::{ExtremesError, Options, extremes};
 use crate::identities::{At, DIFFERENCE, IDENTITY};
-use crate::material::Material;
+use crate::material::{Material, Moduli};
 use crate::number::Exact;
 use crate::states::{ROTATIONS, Random, STRAINS};
 use crate::subject::Subject;
@@ -92,11 +94,69 @@ pub fn check(subject: &Subject, options: Options, device: Result<&Device, String
         let detail = format!("mu = {:.6e}, K = {:.6e}, E = {young:.6e}, nu = {:.6}", m.shear, m.bulk, m.poisson());
         findings.push(note("small-strain moduli", detail));
     }
+    findings.push(declared(subject, options.seed));
+    for line in crate::explain::accepted(&subject.law) {
+        findings.push(note("accepted without proof", line));
+    }
     findings.push(stability(subject, &materials));
     findings.extend(identities(subject, &materials, options.seed));
     findings.push(domain(subject, &materials, options.seed));
     findings.push(precision(subject, options, device)?);
     Ok(Report { law: subject.name().to_string(), materials, findings })
+}
+
+/// How far the tangent at rest may be from the declared moduli, as a part of it: declarations may be rounded numbers.
+const MODULI: f64 = 1e-12;
+
+/// Materials at which declared moduli are compared: no parameter keeps a value at which its part vanishes.
+const DECLARED: u64 = 4;
+
+/// The tangent at rest against the declared moduli: dP = 2 mu eps + (K - 2/3 mu) tr(eps) 1.
+fn declared(subject: &Subject, seed: u64) -> Finding {
+    let name = "declared small-strain moduli";
+    let law = &subject.law;
+    let Some(moduli) = &law.moduli else { return note(name, "none are declared".into()) };
+    let mut worst = 0.0;
+    for k in 0..DECLARED {
+        let mut random = Random::new(&[seed, 3, k]);
+        let parameters = random_parameters(law, &mut random);
+        let mut components = parameters.iter().map(|x| Exact::from(*x));
+        let by_parameter: Vec<Vec<Exact>> =
+            law.parameters.iter().map(|p| components.by_ref().take(p.len).collect()).collect();
+        let value = |m: &Scalar| evaluate::value(m, &by_parameter).expect("declared moduli depend on no strain");
+        let (shear, bulk) = (value(&moduli.shear), value(&moduli.bulk));
+        let material = Material { parameters, moduli: Moduli { shear: shear.to_f64(), bulk: bulk.to_f64() } };
+        let tangent = ExactLaw::new(&subject.derivation, &material).tangent(&exact(&[0.0; 9]));
+        let third = Exact::from_rational(Rational::new(1, 3));
+        let lambda = bulk.sub(&shear.add(&shear).mul(&third));
+        let wanted: Vec<Exact> = (0..81)
+            .map(|at| {
+                let (i, j, k, l) = (at / 27, at / 9 % 3, at / 3 % 3, at % 3);
+                let times = |on: bool, x: &Exact| if on { x.clone() } else { Exact::zero() };
+                let shears = times((i, j) == (k, l), &shear).add(&times((i, j) == (l, k), &shear));
+                shears.add(&times(i == j && k == l, &lambda))
+            })
+            .collect();
+        let off = difference(tangent.as_flattened(), &wanted, &Exact::norm(tangent.as_flattened()));
+        worst = if off.is_nan() { f64::INFINITY } else { off.max(worst) };
+    }
+    let detail = format!("{}: {worst:.1e} from the tangent at rest, {MODULI:.0e} is allowed", moduli.text);
+    finding(name, worst <= MODULI, detail)
+}
+
+/// Parameters anywhere in their ranges; orders of magnitude alike where a range is of one sign.
+fn random_parameters(law: &Law, random: &mut Random) -> Vec<f64> {
+    let component = |(low, high): (f64, f64), t: f64| {
+        if low > 0.0 {
+            low * (high / low).powf(t)
+        } else if high < 0.0 {
+            high * (low / high).powf(t)
+        } else {
+            low + (high - low) * t
+        }
+    };
+    let ranges = law.parameters.iter().flat_map(|p| vec![p.range; p.len]);
+    ranges.map(|range| component(range, 0.5 + 0.5 * random.signed())).collect()
 }
 
 /// The least eigenvalue of the tangent at rest, over symmetric strains.
@@ -236,6 +296,33 @@ fn precision(subject: &Subject, options: Options, device: Result<&Device, String
 mod tests {
     use super::*;
 
+    /// Moduli are compared at every law that declares them; one part in a hundred too much of either is found.
+    #[test]
+    fn declared_moduli_are_those_at_rest() {
+        let mut declared_ones = 0;
+        for entry in tensormass_kernels::laws() {
+            let right = Subject::of_build(entry);
+            let isotropic = entry.info.structure.isotropic;
+            assert_eq!(right.law.moduli.is_some(), isotropic, "{}: its moduli are declared", entry.info.name);
+            assert_eq!(declared(&right, 1).verdict == Verdict::Passed, isotropic, "{}", entry.info.name);
+            if !isotropic {
+                continue;
+            }
+            declared_ones += 1;
+            for name in ["shear = ", "bulk = ", "lame_lambda = "] {
+                let text = entry.source.law;
+                let wrong = text.replacen(name, &format!("{name}1.01 * "), 1);
+                if wrong == text {
+                    continue;
+                }
+                let path = format!("{}.rs", entry.info.name);
+                let subject = Subject::from_texts(&path, &wrong, entry.source.derivation).expect("a law");
+                assert_eq!(declared(&subject, 1).verdict, Verdict::Failed, "{}: {name}", entry.info.name);
+            }
+        }
+        assert!(declared_ones > 0, "no law declares its moduli");
+    }
+
     /// What has to hold of every law, however its kernels round.
     #[test]
     fn laws_of_this_build_are_hyperelastic() {
@@ -244,7 +331,7 @@ mod tests {
             let options = Options { samples: 0, seed: 3 };
             let report = check(&subject, options, Err("not asked for".into())).expect("a material");
             assert!(report.failed().is_empty(), "{}: {:?}", entry.info.name, report.findings);
-            assert_eq!(report.findings.len() - report.materials.len(), 11, "every finding is made, once");
+            assert_eq!(report.findings.len() - report.materials.len(), 12, "every finding is made, once");
         }
     }
 }

@@ -3,17 +3,21 @@
 
 use tensormass_codegen::derivation::Derivation;
 use tensormass_codegen::ir::{Input, Op, ValidKernel, ValueId};
+use tensormass_codegen::law::ast::{Acceptance, Law};
 
 /// Formulas longer than this are cut.
 const LONGEST: usize = 160;
 
-/// The derivation as a page of text.
-pub fn page(derivation: &Derivation) -> String {
+/// The derivation of a law as a page of text.
+pub fn page(law: &Law, derivation: &Derivation) -> String {
     let mut page = format!("{}\n\nconstants, computed once a material\n", derivation.law);
     for (k, constant) in derivation.constants.iter().enumerate() {
         page += &format!("  c{k} = {constant}\n");
     }
     page += &format!("\nW at rest, which is subtracted\n  {}\n", derivation.energy_at_rest);
+    for line in accepted(law) {
+        page += &format!("\naccepted without proof: {line}\n");
+    }
     page += &rewrites(derivation);
     for kernel in derivation.kernels.iter().filter(|k| k.ir().name != "material") {
         page += &format!("\n{}: {} operations\n", kernel.ir().name, kernel.count().arithmetic());
@@ -22,6 +26,12 @@ pub fn page(derivation: &Derivation) -> String {
         }
     }
     page
+}
+
+/// What the law's author vouches for, one line each.
+pub fn accepted(law: &Law) -> Vec<String> {
+    let line = |a: &Acceptance| format!("the {} of `{}`, because: {}", a.kind.name(), a.constant, a.reason);
+    law.acceptances.iter().map(line).collect()
 }
 
 /// Each rewrite: the term as the law file has it, its exact constant at rest, and what is computed instead.

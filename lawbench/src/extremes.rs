@@ -11,7 +11,7 @@ use crate::evaluate::printed;
 use crate::gate::{Machine, Measure, QUANTITIES, Quantity, Reference};
 use crate::material::{Material, MaterialError};
 use crate::number::Exact;
-use crate::states::{Precision, ROTATIONS, Random, STRAINS};
+use crate::states::{Precision, ROTATIONS, Random, STRAINS, State};
 use crate::subject::Subject;
 use crate::wgsl::{Device, DeviceError, Point, Values};
 
@@ -49,6 +49,8 @@ pub struct Cell {
     pub gate: f64,
     /// The worst error as a part of the value.
     pub relative: f64,
+    /// Where the worst error as a part of its bound is.
+    pub state: Option<State>,
 }
 
 /// Stress at rest, where it has to be 0 exactly.
@@ -91,6 +93,8 @@ pub struct Extremes {
     pub plain: Option<Plain>,
     /// What computed the WGSL.
     pub wgsl: Adapter,
+    /// What the law's author vouches for, and the kernels rely on.
+    pub accepted: Vec<String>,
 }
 
 /// What computed the WGSL, or why nothing did.
@@ -129,7 +133,7 @@ struct Single {
 
 /// What one cell's states gave.
 struct Sampled {
-    measures: Vec<(What, Measure)>,
+    measures: Vec<(What, Measure, State)>,
     plain: Option<Plain>,
     singles: Vec<Single>,
 }
@@ -155,7 +159,12 @@ impl Prepared {
 }
 
 /// P, W and dP at one state as the printed kernels compute them; W counts from rest.
-fn computed<T: Precision>(derivation: &Derivation, constants: &[T], g: &[T; 9], d: &[T; 9]) -> [Vec<f64>; 3] {
+pub(crate) fn computed<T: Precision>(
+    derivation: &Derivation,
+    constants: &[T],
+    g: &[T; 9],
+    d: &[T; 9],
+) -> [Vec<f64>; 3] {
     let exactly = |values: Vec<T>| values.into_iter().map(T::exactly).collect::<Vec<f64>>();
     let inputs =
         [(Input::Constants, constants), (Input::DisplacementGradient, &g[..]), (Input::GradientIncrement, &d[..])];
@@ -198,7 +207,7 @@ pub fn extremes(
     }
     let mut plain: Option<Plain> = None;
     for (place, cell) in places.iter().zip(&sampled) {
-        cell.measures.iter().for_each(|(what, measure)| tally.add(*what, *place, *measure));
+        cell.measures.iter().for_each(|(what, measure, state)| tally.add(*what, *place, *measure, *state));
         let worse = cell.plain.filter(|new| plain.is_none_or(|old| new.relative > old.relative));
         plain = worse.or(plain);
     }
@@ -213,7 +222,8 @@ pub fn extremes(
     let machines = [Machine::F32, Machine::F64, Machine::Wgsl];
     let machines = &machines[..if matches!(wgsl, Adapter::Device(_)) { 3 } else { 2 }];
     let cells = tally.cells(machines, &places);
-    Ok(Extremes { law: subject.name().to_string(), materials, cells, rest, plain, wgsl })
+    let accepted = crate::explain::accepted(&subject.law);
+    Ok(Extremes { law: subject.name().to_string(), materials, cells, rest, plain, wgsl, accepted })
 }
 
 /// The states of one cell in f32 and f64.
@@ -227,12 +237,13 @@ fn sample(derivation: &Derivation, material: &Prepared, place: Place, options: O
             |g: &[f64; 9], d: &[f64; 9]| Reference::new(derivation, &material.exact, &material.exact_energy, g, d);
         if let Some(reference) = exact(&g, &d) {
             let values = computed(derivation, &material.double, &g, &d);
-            sampled.judge(Machine::F64, &reference, &values);
+            sampled.judge(Machine::F64, &reference, &values, State { gradient: g, direction: d });
         }
         let (single, direction) = (g.map(f32::nearest), d.map(f32::nearest));
         if let Some(reference) = exact(&single.map(f64::from), &direction.map(f64::from)) {
             let values = computed(derivation, &material.single, &single, &direction);
-            let worst = sampled.judge(Machine::F32, &reference, &values);
+            let state = State { gradient: single.map(f64::from), direction: direction.map(f64::from) };
+            let worst = sampled.judge(Machine::F32, &reference, &values, state);
             if ROTATIONS[r] == 0.0 && STRAINS[s] <= PLAIN.1 && reference.condition <= PLAIN.2 {
                 let new = worst.map(|p| Plain { relative: p.relative, strain: STRAINS[s], material: m });
                 let worse = new.filter(|new| sampled.plain.is_none_or(|old| new.relative > old.relative));
@@ -247,10 +258,16 @@ fn sample(derivation: &Derivation, material: &Prepared, place: Place, options: O
 
 impl Sampled {
     /// Measures the three quantities; gives P's measure.
-    fn judge(&mut self, machine: Machine, reference: &Reference, values: &[Vec<f64>; 3]) -> Option<Measure> {
+    fn judge(
+        &mut self,
+        machine: Machine,
+        reference: &Reference,
+        values: &[Vec<f64>; 3],
+        state: State,
+    ) -> Option<Measure> {
         let measures = QUANTITIES.map(|q| reference.measure(machine, q, &values[q as usize]));
         for (quantity, measure) in QUANTITIES.into_iter().zip(measures) {
-            self.measures.extend(measure.map(|m| ((machine, quantity), m)));
+            self.measures.extend(measure.map(|m| ((machine, quantity), m, state)));
         }
         measures[Quantity::P as usize]
     }
@@ -278,7 +295,9 @@ fn on_device(
         let energy = f64::from((*energy as f32) - (zero[single.place.0].energy as f32));
         for (quantity, value) in QUANTITIES.into_iter().zip([&stress[..], &[energy], &differential[..]]) {
             if let Some(measure) = single.reference.measure(Machine::Wgsl, quantity, value) {
-                tally.add((Machine::Wgsl, quantity), single.place, measure);
+                let Point { gradient, direction, .. } = &single.point;
+                let state = State { gradient: gradient.map(f64::from), direction: direction.map(f64::from) };
+                tally.add((Machine::Wgsl, quantity), single.place, measure, state);
             }
         }
     }
@@ -287,13 +306,16 @@ fn on_device(
 
 /// The worst of each cell.
 #[derive(Default)]
-struct Tally(HashMap<(What, Place), (usize, Measure)>);
+struct Tally(HashMap<(What, Place), (usize, Measure, Option<State>)>);
 
 impl Tally {
-    fn add(&mut self, what: What, place: Place, new: Measure) {
-        let none = (0, Measure { gate: 0.0, relative: 0.0 });
-        let (count, worst) = self.0.entry((what, place)).or_insert(none);
+    fn add(&mut self, what: What, place: Place, new: Measure, state: State) {
+        let none = (0, Measure { gate: 0.0, relative: 0.0 }, None);
+        let (count, worst, at) = self.0.entry((what, place)).or_insert(none);
         *count += 1;
+        if at.is_none() || new.gate > worst.gate {
+            *at = Some(state);
+        }
         worst.gate = worst.gate.max(new.gate);
         worst.relative = worst.relative.max(new.relative);
     }
@@ -304,15 +326,21 @@ impl Tally {
             for quantity in QUANTITIES {
                 for &(material, s, r) in places {
                     let found = self.0.get(&((machine, quantity), (material, s, r)));
-                    let (states, worst) = found.copied().unwrap_or((0, Measure { gate: 0.0, relative: 0.0 }));
+                    let (states, worst, state) =
+                        found.copied().unwrap_or((0, Measure { gate: 0.0, relative: 0.0 }, None));
                     let (strain, rotation) = (STRAINS[s], ROTATIONS[r]);
                     let Measure { gate, relative } = worst;
-                    cells.push(Cell { machine, quantity, material, strain, rotation, states, gate, relative });
+                    cells.push(Cell { machine, quantity, material, strain, rotation, states, gate, relative, state });
                 }
             }
         }
         cells
     }
+}
+
+/// Numbers with commas between them, the shortest text that reads back to the same bits.
+fn list(values: &[f64]) -> String {
+    values.iter().map(|x| format!("{x:e}")).collect::<Vec<_>>().join(",")
 }
 
 impl Extremes {
@@ -346,6 +374,17 @@ impl Extremes {
             ));
         }
         failures
+    }
+
+    /// For each cell above the gate among the worst, the arguments with which `law replay` shows its worst state.
+    pub fn replays(&self, names: &[String]) -> Vec<String> {
+        let line = |cell: &&Cell| {
+            let state = cell.state?;
+            let set = names.iter().zip(&self.materials[cell.material].parameters);
+            let set = set.map(|(name, x)| format!("--set {name}={x:?} ")).collect::<String>();
+            Some(format!("{set}--gradient={} --direction={}", list(&state.gradient), list(&state.direction)))
+        };
+        self.worst().iter().filter(|cell| cell.gate > 1.0).filter_map(line).collect()
     }
 
     /// The worst cell of each machine and quantity.

@@ -9,8 +9,8 @@ use crate::states::Random;
 /// Identities are of 448 bits: what is left of 140 bits of cancellation, and 250 bits below what f64 could see.
 pub const IDENTITY: f64 = 1e-90;
 
-/// Central differences over h = 1e-20, extrapolated once, are off by h^4 times a ratio of derivatives, which at stretches
-/// between 1/11 and 11 is below 1e20.
+/// Central differences over h = 1e-24, extrapolated once, are off by h^4 times a ratio of derivatives, which at stretches
+/// between 1/11 and 11 is below 1e36: exponentials of the strain's square come to 1e22.
 pub const DIFFERENCE: f64 = 1e-60;
 
 /// A state and a random direction, and what is needed to move them.
@@ -60,7 +60,7 @@ impl<'a> At<'a> {
             let twice = h.add(h);
             ahead.iter().zip(&behind).map(|(a, b)| a.sub(b).div(&twice)).collect()
         };
-        let h = Exact::power_of_ten(-20);
+        let h = Exact::power_of_ten(-24);
         let (wide, narrow) = (over(&h), over(&h.mul(&Exact::from(0.5))));
         let (four, three) = (Exact::from(4.0), Exact::from(3.0));
         wide.iter().zip(&narrow).map(|(w, n)| four.mul(n).sub(w).div(&three)).collect()

@@ -23,6 +23,7 @@ mod identities;
 mod lanes;
 pub mod material;
 pub mod number;
+pub mod replay;
 pub mod states;
 pub mod subject;
 mod svg;

@@ -8,6 +8,15 @@ pub const STRAINS: [f64; 12] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0
 /// Angles in rad by which states are turned, about random axes.
 pub const ROTATIONS: [f64; 5] = [0.0, 1e-3, 0.1, 0.5, 2.0];
 
+/// A displacement gradient and the direction of its increment, row by row.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct State {
+    /// G.
+    pub gradient: [f64; 9],
+    /// D.
+    pub direction: [f64; 9],
+}
+
 /// A number type in which kernels compute.
 pub trait Precision: Number + Copy {
     /// The nearest number of this type.

@@ -89,6 +89,9 @@ pub fn extremes(extremes: &Extremes, names: &[String]) -> String {
     if let Adapter::Skipped(reason) = &extremes.wgsl {
         text += &format!("\nwgsl: skipped, {reason}\n");
     }
+    for line in &extremes.accepted {
+        text += &format!("\naccepted without proof: {line}\n");
+    }
     let failures = extremes.failures();
     text += "\n";
     match failures.as_slice() {

@@ -30,4 +30,4 @@ pub mod step_limit;
 pub mod system;
 pub mod target;
 
-pub use tensormass_kernels::{LawEntry, LawInfo, Operations, ParameterInfo, Structure, law, laws};
+pub use tensormass_kernels::{Acceptance, LawEntry, LawInfo, Operations, ParameterInfo, Structure, law, laws};

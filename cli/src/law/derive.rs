@@ -1,4 +1,4 @@
-//! `tensormass law derive`: one law file in, its derivation out.
+//! `tensormass law derive`: law files in, their derivations out.
 
 use std::path::{Path, PathBuf};
 
@@ -13,25 +13,32 @@ use crate::text;
 /// Arguments of `law derive`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// A law file, or a name that stands for laws/NAME.rs in the current folder.
-    #[arg(value_name = "NAME_OR_FILE")]
-    law: String,
-    /// The folder into which NAME.ir is written; it is made if need be.
+    /// Law files, or names that stand for laws/NAME.rs in the current folder.
+    #[arg(value_name = "NAME_OR_FILE", required = true)]
+    laws: Vec<String>,
+    /// The folder into which each NAME.ir is written; it is made if need be.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }
 
-/// Differentiates a law and writes DIR/NAME.ir; nothing half-written ever has that name.
+/// Differentiates laws, in one process, and writes DIR/NAME.ir of each; nothing half-written ever has that name.
 ///
 /// # Errors
-/// The law file is missing or wrong, the folder cannot be written, or this build cannot differentiate.
+/// A law file is missing or wrong (then none is written), the folder cannot be written, or this build cannot differentiate.
 pub fn call(arguments: &Arguments) -> Result<(), Failure> {
     if !worker::available() {
         return Err(failure(WorkerError::NotAvailable));
     }
-    let path = law_path(&arguments.law)?;
-    let law = read(&path)?;
-    let name = law.name.clone();
+    let mut laws: Vec<(PathBuf, Law)> = vec![];
+    for argument in &arguments.laws {
+        let path = law_path(argument)?;
+        let law = read(&path)?;
+        if let Some((other, _)) = laws.iter().find(|(_, other)| other.name == law.name) {
+            let (name, other, path) = (&law.name, other.display(), path.display());
+            return Err(Failure::bad_input(format!("{path}: {other} is a law `{name}`, too; rename one of the files")));
+        }
+        laws.push((path, law));
+    }
     let unwritable = |error: std::io::Error| {
         Failure::bad_input(format!(
             "{}: {error}; --out takes a folder that can be made and written",
@@ -41,16 +48,15 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
     std::fs::create_dir_all(&arguments.out).map_err(unwritable)?;
     let out = line(&arguments.out)?;
     // Beside the target, so that the rename stays within one file system.
-    let scratch = Scratch(Path::new(out).join(format!(".{name}.{}", std::process::id())));
+    let scratch = Scratch(Path::new(out).join(format!(".derive.{}", std::process::id())));
     std::fs::create_dir(&scratch.0).map_err(unwritable)?;
-    let derivations = worker::derive(&[(path, law)], &scratch.0).map_err(failure)?;
-    let target = arguments.out.join(format!("{name}.ir"));
-    std::fs::rename(scratch.0.join(format!("{name}.ir")), &target).map_err(unwritable)?;
-    text::print(&format!("wrote {} ({} kernels)\n", target.display(), derivations.iter().map(count).sum::<usize>()))
-}
-
-fn count(derivation: &Derivation) -> usize {
-    derivation.kernels.len()
+    let derivations = worker::derive(&laws, &scratch.0).map_err(failure)?;
+    for Derivation { law: name, kernels, .. } in &derivations {
+        let target = arguments.out.join(format!("{name}.ir"));
+        std::fs::rename(scratch.0.join(format!("{name}.ir")), &target).map_err(unwritable)?;
+        text::print(&format!("wrote {} ({} kernels)\n", target.display(), kernels.len()))?;
+    }
+    Ok(())
 }
 
 /// A folder that is removed with the value, whatever happened in between.

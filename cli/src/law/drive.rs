@@ -46,7 +46,7 @@ fn mode(text: &str) -> Result<Mode, String> {
     MODES.iter().find(|(name, _)| *name == text).map(|(_, m)| *m).ok_or_else(|| format!("the modes are {}", known()))
 }
 
-fn assignment(text: &str) -> Result<(String, f64), String> {
+pub(super) fn assignment(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("write PARAMETER=VALUE, as young=1e6")?;
     let value =
         value.trim().parse().map_err(|_| format!("`{}` is not a number; write PARAMETER=VALUE", value.trim()))?;

@@ -21,5 +21,5 @@ pub struct Arguments {
 /// There is no such law, or it cannot be differentiated; the output cannot be written.
 pub fn call(arguments: &Arguments) -> Result<(), Failure> {
     let subject = Subject::open(&arguments.law).map_err(bench::subject)?;
-    text::print(&explain::page(&subject.derivation))
+    text::print(&explain::page(&subject.law, &subject.derivation))
 }

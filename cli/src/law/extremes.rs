@@ -61,6 +61,10 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
             let names: Vec<String> = material::names(&subject.law).into_iter().map(|(name, _)| name).collect();
             let gap = if all.is_empty() { "" } else { "\n" };
             text::print(&format!("{gap}{}", table::extremes(&found, &names)))?;
+            let law = arguments.law.as_deref().unwrap_or(&found.law);
+            for replay in found.replays(&names) {
+                text::print(&format!("  tensormass law replay {law} {replay}\n"))?;
+            }
         }
         all.push(found);
     }

@@ -7,6 +7,7 @@ mod drive;
 mod explain;
 mod extremes;
 mod list;
+mod replay;
 mod show;
 
 use clap::Subcommand;
@@ -28,6 +29,8 @@ pub enum Command {
     Drive(drive::Arguments),
     /// Measure how accurate a law's kernels are, from strains of 1e-8 to 10, turned and nearly incompressible.
     Extremes(extremes::Arguments),
+    /// Compute one state of a material point again, and show how far each precision is off.
+    Replay(replay::Arguments),
     /// Differentiate a law and write its derivation. `cargo xtask law accept` calls this.
     #[command(hide = true)]
     Derive(derive::Arguments),
@@ -45,6 +48,7 @@ pub fn call(command: Command) -> Result<(), Failure> {
         Command::Explain(arguments) => explain::call(&arguments),
         Command::Drive(arguments) => drive::call(&arguments),
         Command::Extremes(arguments) => extremes::call(&arguments),
+        Command::Replay(arguments) => replay::call(&arguments),
         Command::Derive(arguments) => derive::call(&arguments),
     }
 }

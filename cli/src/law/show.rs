@@ -1,7 +1,7 @@
 //! `tensormass law show`: all that is known about one law.
 
 use serde_json::{Value, json};
-use tensormass_runtime::{LawEntry, Operations, ParameterInfo};
+use tensormass_runtime::{Acceptance, LawEntry, Operations, ParameterInfo};
 
 use super::{names, review};
 use crate::failure::Failure;
@@ -41,6 +41,8 @@ pub fn json(entry: &LawEntry) -> Value {
         "domain": law.domain,
         "small_strain": law.small_strain,
         "dissipative": entry.damping.is_some(),
+        "moduli": law.moduli,
+        "accepted": law.accepted.iter().map(accepted_json).collect::<Value>(),
         "parameters": law.parameters.iter().map(parameter_json).collect::<Value>(),
         "constants": law.constants,
         "structure": {
@@ -52,6 +54,10 @@ pub fn json(entry: &LawEntry) -> Value {
         },
         "operations": law.operations.iter().map(operations_json).collect::<Value>(),
     })
+}
+
+fn accepted_json(a: &Acceptance) -> Value {
+    json!({ "kind": a.kind, "constant": a.constant, "reason": a.reason })
 }
 
 fn parameter_json(p: &ParameterInfo) -> Value {
@@ -95,6 +101,7 @@ fn page(entry: &LawEntry) -> String {
         ["domain", law.domain.unwrap_or("everywhere")],
         ["small strain", if law.small_strain { "yes: rotation stresses it" } else { "no" }],
         ["dissipation", dissipation],
+        ["small-strain moduli", law.moduli.unwrap_or("not declared")],
         ["linear", if law.structure.linear { "yes: dP does not depend on G" } else { "no" }],
         ["isotropic", if law.structure.isotropic { "yes" } else { "no" }],
         ["uses J", if law.structure.uses_j { "yes" } else { "no" }],
@@ -103,6 +110,11 @@ fn page(entry: &LawEntry) -> String {
     ];
     page += "\n";
     page += &text::columns("", &facts.map(|row| row.map(String::from).to_vec()));
+    if !law.accepted.is_empty() {
+        page += "\naccepted without proof\n";
+        let rows = law.accepted.iter().map(|a| [a.kind, a.constant, a.reason].map(String::from).to_vec());
+        page += &text::columns("  ", &rows.collect::<Vec<_>>());
+    }
     page += "\nparameters\n";
     page += &text::columns("  ", &law.parameters.iter().map(parameter).collect::<Vec<_>>());
     page += "\nconstants, computed once a material\n";

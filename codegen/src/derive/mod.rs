@@ -8,7 +8,9 @@
 mod damping;
 mod differential;
 mod energy;
+mod far;
 mod fibre;
+mod place;
 mod rest;
 mod spectral;
 mod strain;
@@ -19,7 +21,8 @@ use crate::cas::{Cas, UnexpectedTerm};
 use crate::derivation::Derivation;
 use crate::expr::{Expr, Symbol};
 use crate::ir::{Input, InvalidKernel, KernelIr, Output, Rational};
-use crate::law::ast::Law;
+use crate::law::LawError;
+use crate::law::ast::{Law, Scalar};
 use crate::lower::{Constants, Lowering};
 use crate::quantity::{Kind, Quantities, Value};
 use crate::split::{Rest, SplitError};
@@ -49,6 +52,9 @@ pub enum DeriveError {
     /// The law uses something that this version cannot differentiate.
     #[error("{0}")]
     Unsupported(String),
+    /// What is wrong with the law, and where.
+    #[error(transparent)]
+    Law(Box<LawError>),
 }
 
 /// Differentiates a law.
@@ -56,7 +62,8 @@ pub enum DeriveError {
 /// # Errors
 /// See [`DeriveError`].
 pub fn derive(law: &Law) -> Result<Derivation, DeriveError> {
-    Session::new(law)?.derivation(law)
+    let derived = Session::new(law, &[]).and_then(|(session, _)| session.derivation(law));
+    derived.map_err(|error| place::placed(law, error))
 }
 
 struct Session {
@@ -69,6 +76,8 @@ struct Session {
     rest: Rest,
     /// The energy in C instead of C - I.
     far_energy: Expr,
+    /// The domain's margin in C: where a body is compressed to almost nothing, 3 + tr A loses tr C.
+    far_margin: Option<Expr>,
     /// The comparisons of the law's selections.
     conditions: Vec<(Expr, Expr)>,
     /// Whether a broken power of J multiplies what depends on the strain.
@@ -78,7 +87,8 @@ struct Session {
 }
 
 impl Session {
-    fn new(law: &Law) -> Result<Self, DeriveError> {
+    /// Reads the law, and `others` of its expressions.
+    fn new(law: &Law, others: &[Scalar]) -> Result<(Self, Vec<Expr>), DeriveError> {
         let mut cas = Cas::new();
         let mut quantities = Quantities::default();
         let mut strain = Strain::new(&mut quantities);
@@ -91,28 +101,36 @@ impl Session {
             }
             None => None,
         };
+        let others = others.iter().map(|e| reader.scalar(e)).collect::<Result<Vec<Expr>, _>>()?;
         let ranges = reader.ranges(law);
         let conditions = std::mem::take(&mut reader.conditions);
         let isochoric = reader.isochoric;
         let parameters = reader.parameters.clone();
         reader.far_from_rest();
         let far_energy = reader.scalar(&law.energy)?;
+        let far_margin = match &law.domain {
+            Some(domain) => Some(reader.scalar(&domain.left)? - reader.scalar(&domain.right)?),
+            None => None,
+        };
         let far_energy = cas.normalize(&far_energy)?;
+        let far_margin = far_margin.map(|m| cas.normalize(&m)).transpose()?;
         let margin = margin.map(|m| cas.normalize(&m)).transpose()?;
         let energy = cas.normalize(&energy)?;
-        Ok(Self {
+        let session = Self {
             cas,
             quantities,
             constants: Constants::default(),
             strain,
             energy,
             margin,
-            rest: Rest::new(ranges),
+            rest: Rest::new(ranges, &law.acceptances),
             far_energy,
+            far_margin,
             conditions,
             isochoric,
             parameters,
-        })
+        };
+        Ok((session, others))
     }
 
     fn derivation(mut self, law: &Law) -> Result<Derivation, DeriveError> {
@@ -130,7 +148,8 @@ impl Session {
         let far_energy = self.far_energy.clone();
         let far_energy = if near_energy.is_some() { self.split_at_unit_volume(far_energy) } else { far_energy };
         let from_rest = |e: Expr| if at_rest.is_zero() { e } else { e - at_rest.clone() };
-        let (energy, far_energy) = (from_rest(energy), from_rest(far_energy));
+        let energy = from_rest(energy);
+        let far_energy = self.far_from(far_energy, &at_rest)?;
 
         use Input::{DisplacementGradient as G, GradientIncrement, NodeGradient};
         let mut point = Vec::new();
@@ -147,12 +166,12 @@ impl Session {
                 point.push(self.lower(
                     "energy_far",
                     &[G],
-                    with_margin(Output::EnergyDensity, vec![far_energy], &margin),
+                    with_margin(Output::EnergyDensity, vec![far_energy], &self.far_margin.clone()),
                 ));
             }
             None => point.push(self.lower("energy", &[G], with_margin(Output::EnergyDensity, vec![energy], &margin))),
         }
-        let far_margin = margin.clone();
+        let far_margin = self.far_margin.clone();
         match &near_stress {
             Some(near) => {
                 let mut outputs = with_margin(Output::Stress, near.stress.to_vec(), &near.margin);
@@ -198,6 +217,9 @@ impl Session {
         for mut kernel in point {
             kernel.inputs.insert(0, (Input::Constants, count));
             kernels.push(kernel.validate()?);
+        }
+        if let Some(unused) = self.rest.unused() {
+            return Err(place::unused(law, unused));
         }
         Ok(Derivation {
             law: law.name.clone(),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::expr::{Expr, Symbol};
 use crate::quantity::{Kind, Value};
-use crate::split::{self, Leaves, Split, SplitError, Splitter};
+use crate::split::{self, Leaves, Split, Splitter};
 
 use super::differential::Differential;
 use super::strain::{Base, Invariant};
@@ -40,8 +40,28 @@ pub struct NearStress {
 impl Session {
     /// The energy split to second order, if a rule applies; and the energy at rest.
     pub(super) fn near_energy(&mut self) -> Result<(Option<NearEnergy>, Expr), DeriveError> {
-        let used = self.strain.invariants();
-        let jacobian = used.iter().find(|(i, _)| *i == Invariant::J).map(|&(_, j)| j);
+        let jacobian = self.strain.invariants().iter().find(|(i, _)| *i == Invariant::J).map(|&(_, j)| j);
+        let leaves = self.leaves(jacobian)?;
+        let energy = self.energy.clone();
+        let splitter = Splitter::of_energy(&mut self.cas, &mut self.quantities, &mut self.rest, "energy", leaves);
+        let (near, at_rest) = splitter.energy(&energy)?;
+        let Some(value) = near else { return Ok((None, at_rest)) };
+        let holds = self.near_rest(jacobian.map(Expr::from), true)?;
+        Ok((Some(NearEnergy { value, holds }), at_rest))
+    }
+
+    /// Splits an expression as a part of the energy: for its refusal.
+    pub(super) fn try_part(&mut self, e: &Expr) -> Result<(), DeriveError> {
+        let jacobian = self.strain.invariants().iter().find(|(i, _)| *i == Invariant::J).map(|&(_, j)| j);
+        let leaves = self.leaves(jacobian)?;
+        let e = self.cas.normalize(e)?;
+        let mut splitter = Splitter::of_energy(&mut self.cas, &mut self.quantities, &mut self.rest, "energy", leaves);
+        splitter.split(&e)?;
+        Ok(())
+    }
+
+    /// The invariants of the strain at which the splitting of the energy ends.
+    fn leaves(&mut self, jacobian: Option<Symbol>) -> Result<Leaves, DeriveError> {
         let mut leaves = Leaves::default();
         if let Some(j) = jacobian {
             let half = Expr::ratio(1, 2);
@@ -75,12 +95,7 @@ impl Session {
                 Invariant::J | Invariant::StretchSum(_) | Invariant::Second => {}
             }
         }
-        let energy = self.energy.clone();
-        let splitter = Splitter::of_energy(&mut self.cas, &mut self.quantities, &mut self.rest, "energy", leaves);
-        let (near, at_rest) = splitter.energy(&energy)?;
-        let Some(value) = near else { return Ok((None, at_rest)) };
-        let holds = self.near_rest(jacobian.map(Expr::from), true)?;
-        Ok((Some(NearEnergy { value, holds }), at_rest))
+        Ok(leaves)
     }
 
     /// The textbook energy with its volumetric part, if this vanishes to second order where J = 1, split there: a body
@@ -142,7 +157,7 @@ impl Session {
         for p in stress {
             let split = splitter.split(p)?;
             if !split.rest.is_zero() {
-                return Err(SplitError::StressAtRest(splitter.print(p)).into());
+                return Err(splitter.stressed(p, std::slice::from_ref(&split.rest)).into());
             }
             rewritten |= split.rewritten.0;
             near.push(split.change);

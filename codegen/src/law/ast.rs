@@ -7,6 +7,8 @@ use std::rc::Rc;
 
 use num_rational::Ratio;
 
+use super::error::{LawError, Place, Source};
+
 /// An exact constant of a law, as written: `0.3` is 3/10.
 pub type Rational = Ratio<i128>;
 
@@ -33,6 +35,62 @@ pub struct Law {
     pub parts: Vec<(String, Scalar)>,
     /// The dissipation potential D of strain and strain rate, in W/m^3, if the law has one.
     pub dissipation: Option<Scalar>,
+    /// What the author vouches for because the generator cannot decide it: `#[accept(..)]`.
+    pub acceptances: Vec<Acceptance>,
+    /// The moduli that the author declares: `#[small_strain_moduli(..)]`.
+    pub moduli: Option<DeclaredModuli>,
+    /// Where the energy's expressions stand in the text, each after those that it is made of.
+    pub places: Vec<(Scalar, Place)>,
+}
+
+impl Law {
+    /// A refusal at a place of the law's text.
+    pub fn error(&self, place: Place, reason: impl Into<String>, remedy: impl Into<String>) -> LawError {
+        Source { path: &self.path, text: &self.text }.error(place, reason, remedy)
+    }
+}
+
+/// A constant at rest of which the author says what the generator cannot show.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Acceptance {
+    /// What is said of it.
+    pub kind: Accepted,
+    /// The constant, in the generator's words: as the refusal printed it.
+    pub constant: String,
+    /// Why it is right.
+    pub reason: String,
+    /// Where the attribute stands.
+    pub place: Place,
+}
+
+/// What can be said of a constant at rest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Accepted {
+    /// It is 0 for no material, and positive where a logarithm, a root or a real power is taken of it.
+    Sign,
+    /// It is 0 for every material.
+    Cancellation,
+}
+
+impl Accepted {
+    /// Its name in the attribute.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sign => "sign",
+            Self::Cancellation => "cancellation",
+        }
+    }
+}
+
+/// The moduli at rest that an author declares, in Pa; functions of the parameters.
+#[derive(Debug, Clone)]
+pub struct DeclaredModuli {
+    /// As written: `shear = mu, bulk = kappa`.
+    pub text: String,
+    /// Shear modulus mu.
+    pub shear: Scalar,
+    /// Bulk modulus K.
+    pub bulk: Scalar,
 }
 
 /// A material parameter.

@@ -6,10 +6,10 @@ use proc_macro2::Span;
 use syn::spanned::Spanned;
 use syn::{Expr, Lit, Member};
 
-use super::ast::{Parameter, ScalarNode};
+use super::ast::{Parameter, Scalar, ScalarNode};
 use super::defined::Declared;
 use super::dimension::Dimension;
-use super::error::{LawError, Source};
+use super::error::{LawError, Place, Source};
 use super::functions::Function;
 use super::interval::{Interval, Values};
 use super::literals;
@@ -46,6 +46,8 @@ pub(super) struct Lowering<'a> {
     pub(super) uses_eps: bool,
     /// Whether the expression is the domain's: names are then those of the strain's fields.
     pub(super) in_domain: bool,
+    /// Where the energy's expressions stand, each after those that it is made of.
+    pub(super) places: Vec<(Scalar, Place)>,
     levels: usize,
     steps: usize,
 }
@@ -64,6 +66,7 @@ impl<'a> Lowering<'a> {
             declared: Declared { domain: metadata.has_domain, small_strain: metadata.small_strain.is_some() },
             uses_eps: false,
             in_domain: false,
+            places: Vec::new(),
             levels: 0,
             steps: 0,
         }
@@ -98,6 +101,9 @@ impl<'a> Lowering<'a> {
         self.levels += 1;
         let value = self.kind_of_expr(expr, scope);
         self.levels -= 1;
+        if let (Value::Scalar(scalar), false) = (&value, self.in_domain) {
+            self.places.push((scalar.node.clone(), Place::from(expr.span())));
+        }
         let deep = |facts: Facts| facts.depth > MAX_TREE_DEPTH;
         match value {
             Value::Scalar(ScalarValue { facts, .. }) | Value::Tensor(TensorValue { facts, .. }) if deep(facts) => {

@@ -7,7 +7,8 @@ use syn::punctuated::Punctuated;
 use syn::spanned::Spanned;
 use syn::{Attribute, Expr, Fields, ItemStruct, Lit, LitStr, Meta, Token, Type, UnOp};
 
-use super::ast::Parameter;
+use super::ast::{Acceptance, Parameter};
+use super::claims;
 use super::error::{LawError, Source};
 use super::fibres::{self, Given};
 use super::units;
@@ -16,7 +17,7 @@ use super::words;
 /// Components that an array parameter may have.
 const MAX_COMPONENTS: usize = 64;
 
-const ON_STRUCT: &[&str] = &["domain", "small_strain"];
+const ON_STRUCT: &[&str] = &["domain", "small_strain", "small_strain_moduli", "accept"];
 const ON_FIELD: &[&str] = &["unit", "range", "default", "per_element"];
 
 /// `struct Parameters`, read.
@@ -33,6 +34,10 @@ pub(super) struct Metadata {
     pub(super) has_domain: bool,
     /// The place of `#[small_strain]`.
     pub(super) small_strain: Option<Span>,
+    /// `#[accept(..)]`, each.
+    pub(super) acceptances: Vec<Acceptance>,
+    /// The arguments of `#[small_strain_moduli(..)]`.
+    pub(super) moduli: Option<claims::Given>,
 }
 
 /// The name of a type that is a plain name.
@@ -73,6 +78,14 @@ pub(super) fn read(source: &Source, item: &ItemStruct, errors: &mut Vec<LawError
                 let reason = "`small_strain` takes nothing";
                 errors.push(source.error(attribute.span(), reason, "write `#[small_strain]`"));
             }
+            continue;
+        }
+        if attribute.path().is_ident("accept") {
+            metadata.acceptances.extend(claims::acceptance(source, attribute, errors));
+            continue;
+        }
+        if attribute.path().is_ident("small_strain_moduli") {
+            metadata.moduli = claims::moduli(source, attribute, errors);
             continue;
         }
         metadata.has_domain = true;
@@ -134,7 +147,7 @@ fn known<'a>(
                 format!("unknown attribute `{name}` of {owner}"),
                 remedy,
             ));
-        } else if found.iter().any(|other| other.path() == attribute.path()) {
+        } else if name != "accept" && found.iter().any(|other| other.path() == attribute.path()) {
             let reason = format!("the attribute `{name}` is given twice");
             errors.push(source.error(attribute.path().span(), reason, "remove one of them"));
         } else {

@@ -4,9 +4,11 @@ mod arithmetic;
 pub mod ast;
 mod brackets;
 mod calls;
+mod claims;
 mod defined;
 mod dimension;
 mod error;
+pub mod evaluate;
 mod expr;
 mod fibres;
 mod functions;
@@ -23,5 +25,5 @@ mod uses;
 mod value;
 mod words;
 
-pub use error::LawError;
+pub use error::{LawError, Place};
 pub use parse::parse;

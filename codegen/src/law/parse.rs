@@ -79,13 +79,29 @@ pub fn parse(path: &str, text: &str) -> Result<Law, Vec<LawError>> {
         let unused = unused(&source, &metadata, energy, &others, domain.as_ref());
         lowering.errors.extend(unused);
     }
+    let moduli = metadata.moduli.as_ref().and_then(|given| lowering.moduli(given));
+    let places = std::mem::take(&mut lowering.places);
     let errors = lowering.errors;
     match energy {
         Some((energy, parts)) if errors.is_empty() => {
             let (path, text) = (path.to_owned(), text.to_owned());
             let small_strain = metadata.small_strain.is_some();
-            let parameters = metadata.parameters;
-            Ok(Law { name, path, text, docs, parameters, domain, small_strain, energy, parts, dissipation })
+            let (parameters, acceptances) = (metadata.parameters, metadata.acceptances);
+            Ok(Law {
+                name,
+                path,
+                text,
+                docs,
+                parameters,
+                domain,
+                small_strain,
+                energy,
+                parts,
+                acceptances,
+                moduli,
+                places,
+                dissipation,
+            })
         }
         _ => Err(sorted(errors)),
     }

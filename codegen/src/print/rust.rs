@@ -134,6 +134,17 @@ fn info(law: &Law, derivation: &Derivation, reviewed: bool) -> TokenStream {
         }
         None => quote!(None),
     };
+    let moduli = match &law.moduli {
+        Some(m) => {
+            let text = &m.text;
+            quote!(Some(#text))
+        }
+        None => quote!(None),
+    };
+    let accepted = law.acceptances.iter().map(|a| {
+        let (kind, constant, reason) = (a.kind.name(), &a.constant, &a.reason);
+        quote!(::tensormass_kernels::Acceptance { kind: #kind, constant: #constant, reason: #reason })
+    });
     let constants = &derivation.constants;
     let structure = crate::structure::detect(law, derivation);
     let crate::structure::Structure { linear, isotropic, uses_j, uses_fibres, polynomial } = structure;
@@ -151,6 +162,8 @@ fn info(law: &Law, derivation: &Derivation, reviewed: bool) -> TokenStream {
             parameters: &[#(#parameters),*],
             domain: #domain,
             small_strain: #small_strain,
+            moduli: #moduli,
+            accepted: &[#(#accepted),*],
             constants: &[#(#constants),*],
             structure: Structure {
                 linear: #linear, isotropic: #isotropic, uses_j: #uses_j, uses_fibres: #uses_fibres,

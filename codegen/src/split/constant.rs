@@ -8,13 +8,20 @@ use num_traits::{Signed, ToPrimitive, Zero};
 use crate::cas::{Cas, UnexpectedTerm};
 use crate::expr::{Expr, Rational, Symbol};
 use crate::ir::Number;
+use crate::law::ast::{Acceptance, Accepted};
 use crate::quantity::{Kind, Quantities, Value};
+
+use super::roots::canonical;
 
 /// What is known of constants: the parameters' ranges, and what was simplified before.
 #[derive(Debug, Default)]
 pub struct Constants {
     ranges: HashMap<Symbol, (f64, f64)>,
     simple: HashMap<Expr, Expr>,
+    /// What the law's author vouches for, and whether it was needed.
+    accepted: Vec<(Acceptance, bool)>,
+    /// Whether what seems to be 0 counts as such: constants of the stress are made of those that were accepted in the energy.
+    trusting: bool,
 }
 
 /// A closed interval that holds every value that an expression takes.
@@ -22,11 +29,32 @@ type Interval = (f64, f64);
 
 /// Materials at which a constant that may be zero is evaluated: positions within each parameter's range.
 const PROBES: [f64; 3] = [0.314_159, 0.577_216, 0.836_207];
+/// Constants that are numbers are multiples of 1 over this.
+const SIMPLE: f64 = 12.0;
 
 impl Constants {
     /// Constants over parameters with these ranges.
-    pub fn new(ranges: HashMap<Symbol, (f64, f64)>) -> Self {
-        Self { ranges, simple: HashMap::new() }
+    pub fn new(ranges: HashMap<Symbol, (f64, f64)>, accepted: &[Acceptance]) -> Self {
+        let accepted = accepted.iter().map(|a| (a.clone(), false)).collect();
+        Self { ranges, accepted, ..Self::default() }
+    }
+
+    /// The first acceptance that nothing needed.
+    pub fn unused(&self) -> Option<&Acceptance> {
+        self.accepted.iter().find(|(_, used)| !used).map(|(a, _)| a)
+    }
+
+    /// Whether the author vouches for this of the constant.
+    pub fn accepts(&mut self, kind: Accepted, quantities: &Quantities, e: &Expr) -> bool {
+        let bare = |text: &str| text.split_whitespace().collect::<String>();
+        let text = bare(&crate::print::expression(e, quantities));
+        let found = self.accepted.iter_mut().find(|(a, _)| a.kind == kind && bare(&a.constant) == text);
+        if let Some((_, used)) = found {
+            *used = true;
+            self.trusting |= kind == Accepted::Cancellation;
+            return true;
+        }
+        false
     }
 
     /// The shortest equal form found by writing out named constants one after the other; the number 0 where the
@@ -42,7 +70,7 @@ impl Constants {
             return Ok(known.clone());
         }
         let mut best = cas.normalize(&e)?;
-        let mut written = cas.expand(&e)?;
+        let mut written = expanded(cas, &e)?;
         loop {
             if size(&written) < size(&best) {
                 best = written.clone();
@@ -53,31 +81,54 @@ impl Constants {
                 _ => None,
             });
             match latest {
-                Some((s, value)) => written = cas.expand(&replace(&written, s, &value))?,
+                Some((s, value)) => written = expanded(cas, &replace(&written, s, &value))?,
                 None => break,
             }
         }
         if !matches!(best, Expr::Number(_)) && self.seems_zero(quantities, &written) {
-            let common = cas.together(&written)?;
-            let common = cas.expand(&common)?;
-            if common.is_zero() || cas.expand(&numerator(&common))?.is_zero() {
+            let vouched = |of: &mut Self| of.trusting || of.accepts(Accepted::Cancellation, quantities, &best);
+            if vanishes(cas, &written)? || self.is_near_zero(quantities, &written) && vouched(self) {
                 best = Expr::int(0);
             }
+        }
+        if !matches!(best, Expr::Number(_))
+            && let Some(q) = self.seems_number(quantities, &written)
+            && vanishes(cas, &(written.clone() - Expr::Number(q)))?
+        {
+            best = Expr::Number(q);
         }
         self.simple.insert(e, best.clone());
         Ok(best)
     }
 
-    /// Whether the constant is 0, to rounding, at a few materials.
+    /// As `seems_zero`, and finite.
+    pub fn is_near_zero(&self, quantities: &Quantities, e: &Expr) -> bool {
+        self.seems_zero(quantities, e) && self.probed(quantities, e).all(|(value, _)| value.is_finite())
+    }
+
+    /// Whether the constant is 0, to rounding, or infinite at a few materials.
     fn seems_zero(&self, quantities: &Quantities, e: &Expr) -> bool {
-        PROBES.iter().all(|t| {
+        self.probed(quantities, e).all(|(value, magnitude)| !value.is_finite() || value.abs() <= 1e-9 * magnitude)
+    }
+
+    /// The simple number other than 0 that the constant is, to rounding, at a few materials.
+    fn seems_number(&self, quantities: &Quantities, e: &Expr) -> Option<Rational> {
+        let mut values = self.probed(quantities, e).map(|(value, _)| value);
+        let first = values.next().filter(|value| value.is_finite() && value.abs() < 1e6)?;
+        let near = |value: f64| (value - first).abs() <= 1e-9 * first.abs();
+        let q = Rational::new((first * SIMPLE).round() as i128, SIMPLE as i128);
+        (values.all(near) && !q.is_zero() && near(<f64 as Number>::from_rational(q))).then_some(q)
+    }
+
+    /// The value at each of a few materials, and the sum of the magnitudes of what was added to it.
+    fn probed<'a>(&'a self, quantities: &'a Quantities, e: &'a Expr) -> impl Iterator<Item = (f64, f64)> + 'a {
+        PROBES.iter().map(|t| {
             let at = |s: Symbol, k: usize| {
                 let (low, high) = self.ranges.get(&s).copied().unwrap_or((0.5, 2.0));
                 let t = (t + 0.618_034 * k as f64).fract();
                 if low > 0.0 { low * (high / low).powf(t) } else { low + (high - low) * t }
             };
-            let (value, magnitude) = evaluate(quantities, e, &at);
-            !value.is_finite() || value.abs() <= 1e-9 * magnitude
+            evaluate(quantities, e, &at)
         })
     }
 
@@ -178,6 +229,13 @@ fn evaluate(quantities: &Quantities, e: &Expr, at: &impl Fn(Symbol, usize) -> f6
     }
 }
 
+/// Whether the constant is 0 on one denominator.
+fn vanishes(cas: &mut Cas, e: &Expr) -> Result<bool, UnexpectedTerm> {
+    let common = cas.together(e)?;
+    let common = cas.expand(&common)?;
+    Ok(common.is_zero() || cas.expand(&numerator(&common))?.is_zero())
+}
+
 /// What a quotient has above: the factors that are no negative powers.
 fn numerator(e: &Expr) -> Expr {
     match e {
@@ -203,6 +261,31 @@ fn size(e: &Expr) -> usize {
         Expr::Ln(a) | Expr::Exp(a) => 2 + size(a),
         Expr::Log1p(a) | Expr::Expm1(a) | Expr::Log1pmx(a) | Expr::Expm1mx(a) => 2 + size(a),
     }
+}
+
+/// The expression written out, within functions too, and with powers of numbers in one form.
+fn expanded(cas: &mut Cas, e: &Expr) -> Result<Expr, UnexpectedTerm> {
+    let within = canonical(&inside(cas, e)?);
+    let once = canonical(&cas.expand(&within)?);
+    // What is in one form now may cancel now.
+    cas.expand(&once)
+}
+
+/// The expression with the arguments of its functions written out.
+fn inside(cas: &mut Cas, e: &Expr) -> Result<Expr, UnexpectedTerm> {
+    Ok(match e {
+        Expr::Number(_) | Expr::Symbol(_) => e.clone(),
+        Expr::Sum(xs) => Expr::Sum(xs.iter().map(|x| inside(cas, x)).collect::<Result<_, _>>()?),
+        Expr::Product(xs) => Expr::Product(xs.iter().map(|x| inside(cas, x)).collect::<Result<_, _>>()?),
+        Expr::Power(a, b) => {
+            // An integer power of a sum is written out with the rest.
+            let a = if matches!(**b, Expr::Number(q) if q.is_integer()) { inside(cas, a)? } else { expanded(cas, a)? };
+            Expr::Power(Box::new(a), Box::new(inside(cas, b)?))
+        }
+        Expr::Ln(a) => Expr::Ln(Box::new(expanded(cas, a)?)),
+        Expr::Exp(a) => Expr::Exp(Box::new(expanded(cas, a)?)),
+        Expr::Log1p(_) | Expr::Expm1(_) | Expr::Log1pmx(_) | Expr::Expm1mx(_) => e.clone(),
+    })
 }
 
 fn replace(e: &Expr, s: Symbol, by: &Expr) -> Expr {

@@ -73,18 +73,14 @@ impl Splitter<'_> {
                 "write the law so that the term is smooth at rest",
             );
         }
-        match self.rest.constants.is_positive(self.quantities, rest) {
+        match self.sign(rest)? {
             Some(true) => Ok(()),
             Some(false) => self.refuse(
                 e,
                 &format!("is undefined at rest: what it is taken of is {} there, which is negative", self.text(rest)),
                 "check the formula against its source",
             ),
-            None => self.refuse(
-                e,
-                &format!("is taken of {} at rest, whose sign the declared ranges leave open", self.text(rest)),
-                "narrow a parameter's `#[range(..)]` so that the sign is decided",
-            ),
+            None => self.require_sign(e, "is taken of", rest),
         }
     }
 }

@@ -21,44 +21,25 @@
 //! was rewritten says where it holds (`NearRest`), and has a sibling for elsewhere.
 
 mod constant;
+mod error;
 mod functions;
 mod powers;
 mod product;
+mod roots;
 mod second;
+mod select;
 
 use std::collections::HashMap;
 
 use crate::cas::{Cas, UnexpectedTerm};
 use crate::derivation::Rewrite;
 use crate::expr::{Expr, Symbol};
+use crate::law::ast::{Acceptance, Accepted};
 use crate::quantity::{Kind, Quantities, Value};
 
 use constant::Constants;
+pub use error::SplitError;
 pub use second::{Leaves, Second};
-
-/// Why a law cannot be split at rest.
-#[derive(Debug, thiserror::Error)]
-pub enum SplitError {
-    /// The computer algebra system answered in unknown terms.
-    #[error(transparent)]
-    Cas(#[from] UnexpectedTerm),
-    /// A term has no expansion at rest, or none that is decided for every material.
-    #[error("the term `{term}` {reason}; {remedy}")]
-    Term {
-        /// The term, as text.
-        term: String,
-        /// What is wrong with it.
-        reason: String,
-        /// What the author can do.
-        remedy: String,
-    },
-    /// The stress at rest is not zero.
-    #[error(
-        "the stress at rest is not zero: the energy density begins with {0}, of first order in the strain; add the term \
-         that cancels it"
-    )]
-    StressAtRest(String),
-}
 
 /// A value as its constant at rest and its change since.
 #[derive(Debug, Clone)]
@@ -116,9 +97,22 @@ pub struct Rest {
 }
 
 impl Rest {
-    /// For parameters with these ranges.
-    pub fn new(ranges: HashMap<Symbol, (f64, f64)>) -> Self {
-        Self { constants: Constants::new(ranges), rewrites: vec![] }
+    /// For parameters with these ranges, and what the law's author vouches for.
+    pub fn new(ranges: HashMap<Symbol, (f64, f64)>, accepted: &[Acceptance]) -> Self {
+        Self { constants: Constants::new(ranges, accepted), rewrites: vec![] }
+    }
+
+    /// A constant simplified: see [`Constants::simplify`].
+    ///
+    /// # Errors
+    /// The computer algebra system answered in unknown terms.
+    pub fn simplify(&mut self, cas: &mut Cas, quantities: &Quantities, e: Expr) -> Result<Expr, UnexpectedTerm> {
+        self.constants.simplify(cas, quantities, e)
+    }
+
+    /// The first acceptance that nothing needed.
+    pub fn unused(&self) -> Option<&Acceptance> {
+        self.constants.unused()
     }
 }
 
@@ -156,7 +150,7 @@ impl<'a> Splitter<'a> {
         let split = self.part(e)?;
         match &split.jump {
             Some(Jump { term, reason }) => {
-                self.refuse(term, reason, "let the branches agree where the condition changes")
+                self.refuse(term, reason, "let the branches agree where the condition changes, or narrow the ranges so that it is decided at rest")
             }
             None => Ok(split),
         }
@@ -217,11 +211,6 @@ impl<'a> Splitter<'a> {
         self.rest.rewrites.len()
     }
 
-    /// An expression as text.
-    pub fn print(&self, e: &Expr) -> String {
-        self.text(e)
-    }
-
     fn constant(&mut self, e: Expr) -> Result<Split, SplitError> {
         let rest = self.simplify(e)?;
         Ok(Split {
@@ -265,6 +254,40 @@ impl<'a> Splitter<'a> {
         let rewrite = Rewrite { kernel: self.kernel.to_string(), term, rest, form };
         if !self.rest.rewrites.contains(&rewrite) {
             self.rest.rewrites.push(rewrite);
+        }
+    }
+
+    /// Whether the constant is positive (`true`) or negative (`false`) for every material; `None` if that is open.
+    fn sign(&mut self, constant: &Expr) -> Result<Option<bool>, SplitError> {
+        if let Some(sign) = self.rest.constants.is_positive(self.quantities, constant) {
+            return Ok(Some(sign));
+        }
+        // Written out, a power of a difference hides its sign: (j - 1)^3.
+        let factored = self.cas.factor(constant)?;
+        Ok(self.rest.constants.is_positive(self.quantities, &factored))
+    }
+
+    /// Refuses a term that depends on the sign of a constant which is open, unless the author vouches for it.
+    fn require_sign(&mut self, term: &Expr, does: &str, constant: &Expr) -> Result<(), SplitError> {
+        if self.rest.constants.accepts(Accepted::Sign, self.quantities, constant) {
+            return Ok(());
+        }
+        let constant = self.text(constant);
+        let remedy = format!(
+            "narrow a parameter's `#[range(..)]` so that the sign is decided, or say why it is: `#[accept(sign = \
+             \"{constant}\", reason = \"..\")]`"
+        );
+        let reason = format!("{does} `{constant}` at rest, whose sign the declared ranges leave open");
+        self.refuse(term, &reason, &remedy)
+    }
+
+    /// The refusal of a stress at rest, which begins with `e`.
+    pub fn stressed(&self, e: &Expr, constants: &[Expr]) -> SplitError {
+        match constants.iter().find(|c| self.rest.constants.is_near_zero(self.quantities, c)) {
+            Some(c) if constants.iter().all(|c| self.rest.constants.is_near_zero(self.quantities, c)) => {
+                SplitError::Cancellation(self.text(c))
+            }
+            _ => SplitError::StressAtRest(self.text(e)),
         }
     }
 
@@ -386,88 +409,6 @@ impl<'a> Splitter<'a> {
             self.note_split(e, &split);
         }
         Ok(split)
-    }
-
-    /// A choice: both branches have to have the same constant at rest, unless the condition is decided there.
-    fn select(&mut self, s: Symbol, parts: [&Expr; 4]) -> Result<Split, SplitError> {
-        let [left, right, then, otherwise] = parts;
-        let condition = self.split(&(left.clone() - right.clone()))?;
-        let (then_, otherwise_) = (self.part(then)?, self.part(otherwise)?);
-        if let Some(jump) = then_.jump.clone().or_else(|| otherwise_.jump.clone()) {
-            return Ok(self.jumping(s.into(), jump));
-        }
-        let threshold = self.simplify(Expr::int(-1) * condition.rest.clone())?;
-        let difference = self.simplify(then_.rest.clone() - otherwise_.rest.clone())?;
-        let name = self.quantities.get(s).name.clone();
-        // At rest the condition compares 0 with the threshold.
-        let decided = self.rest.constants.is_positive(self.quantities, &threshold).map(|positive| !positive);
-        let (rest, then_change, otherwise_change) = if difference.is_zero() {
-            (then_.rest.clone(), then_.change.clone(), otherwise_.change.clone())
-        } else {
-            match decided {
-                Some(true) => (then_.rest.clone(), then_.change.clone(), otherwise_.value.clone() - then_.rest.clone()),
-                Some(false) => {
-                    (otherwise_.rest.clone(), then_.value.clone() - otherwise_.rest.clone(), otherwise_.change.clone())
-                }
-                None => {
-                    let (then, otherwise) = (self.text(&then_.rest), self.text(&otherwise_.rest));
-                    let reason =
-                        format!("jumps at rest from {otherwise} to {then}, and which of the two counts is open");
-                    let left = condition.change;
-                    let (then, otherwise) = (then_.value, otherwise_.value);
-                    let value = Value::Select { left, right: threshold, then, otherwise };
-                    let value = self.quantities.add(name, Kind::Stage { value, partials: None });
-                    return Ok(self.jumping(value.into(), Jump { term: s.into(), reason }));
-                }
-            }
-        };
-        let rewritten =
-            (condition.rewritten.0 || !condition.rest.is_zero() || then_.rewritten.0 || otherwise_.rewritten.0, false);
-        let choose = |splitter: &mut Self, name: String, then: Expr, otherwise: Expr| -> Expr {
-            if then == otherwise {
-                return then;
-            }
-            let value = Value::Select { left: condition.change.clone(), right: threshold.clone(), then, otherwise };
-            splitter.quantities.add(name, Kind::Stage { value, partials: None }).into()
-        };
-        let second = match (then_.second, otherwise_.second) {
-            (Some(a), Some(b)) if difference.is_zero() && a.linear == b.linear => {
-                let remainder = choose(self, format!("{name}_remainder"), a.remainder, b.remainder);
-                let order = a.order.min(b.order);
-                Some(Second { linear: a.linear, remainder, order, is_whole: a.is_whole && b.is_whole })
-            }
-            (Some(a), Some(b)) => {
-                // A decided condition takes one branch in a neighbourhood of rest.
-                let taken = match decided {
-                    Some(true) => Some(a),
-                    Some(false) => Some(b),
-                    None => None,
-                };
-                match taken {
-                    Some(near) => {
-                        let linear = near.linear.clone();
-                        let form = near.linear_form();
-                        let then = then_change.clone() - form.clone();
-                        let otherwise = otherwise_change.clone() - form;
-                        let (then, otherwise) = match decided {
-                            Some(true) => (near.remainder.clone(), otherwise),
-                            _ => (then, near.remainder.clone()),
-                        };
-                        let remainder = choose(self, format!("{name}_remainder"), then, otherwise);
-                        Some(Second { linear, remainder, order: near.order, is_whole: false })
-                    }
-                    None => {
-                        let change =
-                            choose(self, format!("{name}_change"), then_change.clone(), otherwise_change.clone());
-                        Some(Second::of_first_order(change))
-                    }
-                }
-            }
-            _ => None,
-        };
-        let change = choose(self, format!("{name}_change"), then_change, otherwise_change);
-        let value = rest.clone() + change.clone();
-        Ok(Split { rest, change, value, rewritten, second, jump: None })
     }
 }
 

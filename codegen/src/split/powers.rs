@@ -40,7 +40,7 @@ impl Splitter<'_> {
             Expr::Number(q) if q.fract().abs() == half => {
                 self.require_positive(e, &a.rest)?;
                 let root = self.root(&a)?;
-                let root = if q.is_positive() { root } else { self.reciprocal(e, &root)? };
+                let root = if q.is_positive() { root } else { self.reciprocal(&root)? };
                 let whole = q.trunc().to_integer();
                 if whole == 0 {
                     return Ok(root);
@@ -64,8 +64,9 @@ impl Splitter<'_> {
 
     fn integer_power(&mut self, e: &Expr, a: &Split, n: i128) -> Result<Split, SplitError> {
         if n < 0 {
+            self.require_nonzero(e, a)?;
             let positive = self.integer_power(e, a, -n)?;
-            return self.reciprocal(e, &positive);
+            return self.reciprocal(&positive);
         }
         let int = |k: i128| Rational::from_integer(k);
         let power = |x: &Expr, k: i128| match k {
@@ -113,8 +114,8 @@ impl Splitter<'_> {
         Ok(Split { rest, change, value, rewritten: (true, a.rewritten.1), second, jump: None })
     }
 
-    /// 1 / (c + y) = 1/c - y / (c (c + y)).
-    fn reciprocal(&mut self, e: &Expr, a: &Split) -> Result<Split, SplitError> {
+    /// What is divided by may not be 0 at rest, for any material.
+    fn require_nonzero(&mut self, e: &Expr, a: &Split) -> Result<(), SplitError> {
         if a.rest.is_zero() {
             return self.refuse(
                 e,
@@ -122,11 +123,14 @@ impl Splitter<'_> {
                 "write the law so that the term is smooth at rest",
             );
         }
-        if self.rest.constants.is_positive(self.quantities, &a.rest).is_none() {
-            let reason =
-                format!("divides by {} at rest, whose sign the declared ranges leave open", self.text(&a.rest));
-            return self.refuse(e, &reason, "narrow a parameter's `#[range(..)]` so that the sign is decided");
+        if self.sign(&a.rest)?.is_none() {
+            self.require_sign(e, "divides by", &a.rest)?;
         }
+        Ok(())
+    }
+
+    /// 1 / (c + y) = 1/c - y / (c (c + y)).
+    fn reciprocal(&mut self, a: &Split) -> Result<Split, SplitError> {
         let rest = self.reciprocal_of(&a.rest)?;
         let over = |x: Expr| x / a.value.clone();
         let change = over(Expr::int(-1) * rest.clone() * a.change.clone());

@@ -124,7 +124,8 @@ impl<'a> Splitter<'a> {
         let split = self.split(energy)?;
         let second = split.second.expect("an energy is split to second order");
         if !second.linear.is_empty() {
-            return Err(SplitError::StressAtRest(self.text(&second.linear_form())));
+            let constants: Vec<Expr> = second.linear.values().cloned().collect();
+            return Err(self.stressed(&second.linear_form(), &constants));
         }
         if second.order < 2 {
             return self.refuse(

@@ -115,7 +115,7 @@ fn kernel(near_rest: bool) -> ValidKernel {
     if near_rest {
         let from_rest = spectrum.moment_from_rest(&mut q, &a);
         outputs.extend(from_rest.map(Expr::from));
-        outputs.push(spectrum.first_order(&mut q, &a).into());
+        outputs.push(spectrum.first_order(&mut q, &a, &from_rest).into());
         outputs.push(spectrum.second_order(&mut q, &a).into());
     }
     let mut lowering = Lowering::new(&q, None, Expr::clone);
