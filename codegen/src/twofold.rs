@@ -70,7 +70,7 @@ impl Twofold {
 
     /// Exponential: 2^n exp(r)^256 with |r| <= ln 2 / 512 by its series.
     pub fn exp(self) -> Self {
-        if !(self.high.abs() < 700.0) {
+        if self.high.is_nan() || self.high.abs() >= 700.0 {
             return self.high.exp().into();
         }
         let n = (self.high / std::f64::consts::LN_2).round();

@@ -11,7 +11,7 @@
 //!
 //! in Frobenius norms; WGSL is granted twice as much. A state counts where it is inside the law's domain, the values and
 //! their bounds are normal numbers of the precision, and the tangent does not jump within the rounding of G: where a
-//! selection of the law is not decided by the input, nothing is promised.
+//! selection of the law is not decided by the input ([`crate::undecided`]), nothing is promised.
 
 use tensormass_codegen::derivation::Derivation;
 use tensormass_codegen::ir::{Input, Number};

@@ -15,6 +15,9 @@ const GREATEST_STRAIN: (i128, i128) = (16, 1);
 /// With principal stretches, whose squares are 1 + a_p with errors of the greatest a_p: up to A:A = 4.
 const GREATEST_STRETCH: (i128, i128) = (4, 1);
 
+/// Pairs of a quantity and what is computed for it.
+pub type StandIns = Vec<(Symbol, Symbol)>;
+
 /// The energy near rest.
 pub struct NearEnergy {
     /// W - W(0).
@@ -191,7 +194,7 @@ impl Session {
         &mut self,
         near: &NearStress,
         dgradient: &[Symbol],
-    ) -> Result<(Vec<Expr>, Vec<(Symbol, Symbol)>), DeriveError> {
+    ) -> Result<(Vec<Expr>, StandIns), DeriveError> {
         let stress_symbols: Vec<Symbol> = near.stress.iter().flat_map(|e| e.symbols()).collect();
         let (mut same, mut instead) = (BTreeMap::new(), vec![]);
         for &(s, change, value) in &near.split {
@@ -267,7 +270,7 @@ impl Session {
     /// What tangents compute otherwise than the textbook, although nothing in them cancels, as pairs of a quantity and
     /// its stand-in: J with fewer roundings near rest (1 + j where j > -1/2), because they divide by it more than once;
     /// and selections by comparisons that are decided rightly near rest.
-    pub(super) fn accurate(&mut self) -> Result<Vec<(Symbol, Symbol)>, DeriveError> {
+    pub(super) fn accurate(&mut self) -> Result<StandIns, DeriveError> {
         let jacobian = self.strain.invariants().iter().find(|(i, _)| *i == Invariant::J).map(|&(_, j)| j);
         let sums = self.strain.near_stretch_sums(&mut self.quantities);
         let selections = self.quantities.selections();
