@@ -114,7 +114,7 @@ impl<'a> Energy<'a> {
             ScalarNode::Sub(a, b) => self.scalar(a)? - self.scalar(b)?,
             ScalarNode::Mul(a, b) => {
                 let (a, b) = (self.scalar(a)?, self.scalar(b)?);
-                self.product(a, b)?
+                self.product(a, b, "isochoric")?
             }
             ScalarNode::Div(a, b) => self.scalar(a)? / self.scalar(b)?,
             ScalarNode::Neg(a) => Expr::int(-1) * self.scalar(a)?,
@@ -175,12 +175,18 @@ impl<'a> Energy<'a> {
     fn isochoric(&mut self, r: Rational, i: ast::Invariant) -> Result<Expr, DeriveError> {
         let power = self.basic(Invariant::J)?.pow(r);
         let invariant = self.invariant(i)?;
-        self.product(power, invariant)
+        let name = match i {
+            ast::Invariant::I1 => "I1bar",
+            ast::Invariant::I2 => "I2bar",
+            ast::Invariant::I4(_) => "I4bar",
+            _ => "I5bar",
+        };
+        self.product(power, invariant, name)
     }
 
     /// a b. A broken power of J times what depends on the strain is a stage x = J^r b with dx = J^r db + r x dJ / J:
     /// its two parts nearly cancel in every isochoric change, once, instead of in each second derivative by J.
-    fn product(&mut self, a: Expr, b: Expr) -> Result<Expr, DeriveError> {
+    fn product(&mut self, a: Expr, b: Expr, name: &str) -> Result<Expr, DeriveError> {
         let broken_power = |e: &Expr| match e {
             Expr::Power(base, exponent) => match (&**base, &**exponent) {
                 (Expr::Symbol(_), Expr::Number(r)) if r.is_integer() => None,
@@ -201,7 +207,7 @@ impl<'a> Energy<'a> {
         }
         let name = match &other {
             Expr::Symbol(s) => format!("{}bar", self.quantities.get(*s).name),
-            _ => "isochoric".into(),
+            _ => name.to_string(),
         };
         let value = self.cas.normalize(&(power.clone() * other.clone()))?;
         let stage = self.quantities.stage(name, value);
