@@ -222,22 +222,26 @@ fn cauchy_stress_is_p_f_over_j(case: &mut Case) -> Vec<Comparison> {
     all
 }
 
+/// Each component in f32 against that in f64, with the bound of its roundings.
+fn in_single(what: &str, double: &[Rounded], single: &[f32]) -> Vec<Comparison> {
+    let magnitude = double.iter().fold(0.0f64, |m, x| m.max(x.value.abs()));
+    let component = |k: usize| Comparison {
+        what: format!("{what} {k} in f32"),
+        left: f64::from(single[k]),
+        right: double[k].value,
+        tolerance: double[k].bound(SINGLE),
+        magnitude: magnitude * SINGLE_USEFUL,
+    };
+    (0..single.len()).map(component).collect()
+}
+
 /// What f32 kernels lose is rounding, and no more.
 fn single_precision_is_double_rounded(case: &mut Case) -> Vec<Comparison> {
     let d = case.rng.direction();
     let (g, g32, d32) = (exact(&case.g), case.g.map(|x| x as f32), d.map(|x| x as f32));
     let (point, single) = (&case.point, &case.point.single);
     let mut all = vec![];
-    let mut compare = |what: &str, double: &[Rounded], single: &[f32]| {
-        let magnitude = double.iter().fold(0.0f64, |m, x| m.max(x.value.abs()));
-        all.extend((0..single.len()).map(|k| Comparison {
-            what: format!("{what} {k} in f32"),
-            left: f64::from(single[k]),
-            right: double[k].value,
-            tolerance: double[k].bound(SINGLE),
-            magnitude: magnitude * SINGLE_USEFUL,
-        }));
-    };
+    let mut compare = |what: &str, double: &[Rounded], single: &[f32]| all.extend(in_single(what, double, single));
     compare("W", &[point.energy(&g)], &[single.energy(&g32).0]);
     compare("P", &point.force(&g), &single.force(&g32).0);
     compare("dP", &point.dforce(&g, &exact(&d)), &single.dforce(&g32, &d32));

@@ -1,10 +1,10 @@
 //! Laws with a dissipation: P_v is the derivative of D by the rate, its differential is symmetric, and nothing is damped
 //! that only turns. Laws without one have nothing to compare.
 
-use tensormass_testing::rounding::{Rounded, SINGLE};
+use tensormass_testing::rounding::Rounded;
 use tensormass_testing::tensor::{Matrix, ddot, exact, magnitude, product, rotation, shifted};
 
-use super::{Case, Comparison, SINGLE_USEFUL, derivative, moved};
+use super::{Case, Comparison, derivative, in_single, moved};
 
 /// A random rate with the case's state, if its law has a dissipation.
 fn rate(case: &mut Case) -> Option<[f64; 9]> {
@@ -132,16 +132,7 @@ pub fn single_precision_damps_as_double(case: &mut Case) -> Vec<Comparison> {
     let [g, rate, d] = [case.g, rate, d].map(|m| exact(&m));
     let (point, single) = (&case.point, &case.point.single);
     let mut all = vec![];
-    let mut compare = |what: &str, double: &[Rounded], single: &[f32]| {
-        let magnitude = double.iter().fold(0.0f64, |m, x| m.max(x.value.abs()));
-        all.extend((0..single.len()).map(|k| Comparison {
-            what: format!("{what} {k} in f32"),
-            left: f64::from(single[k]),
-            right: double[k].value,
-            tolerance: double[k].bound(SINGLE),
-            magnitude: magnitude * SINGLE_USEFUL,
-        }));
-    };
+    let mut compare = |what: &str, double: &[Rounded], single: &[f32]| all.extend(in_single(what, double, single));
     compare("D", &[point.dissipation(&g, &rate)], &[single.dissipation(&g32, &r32)]);
     compare("P_v", &point.damping(&g, &rate), &single.damping(&g32, &r32));
     compare("dP_v", &point.ddamping(&g, &rate, &d), &single.ddamping(&g32, &r32, &d32));
