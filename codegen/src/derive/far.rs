@@ -1,8 +1,9 @@
 //! The energy far from rest: textbook but for ln(1 + z), exp(z) - 1 and (1 + z)^r - 1, whose small z would lose digits
-//! wherever a law is nearly linear in it, as Gent's is in (I1bar - 3) / J_m.
+//! wherever a law is nearly linear in it, as Gent's is in (I1bar - 3) / J_m; and but for volumetric parts at J = 1.
 
 use crate::expr::{Expr, Rational};
 use crate::quantity::{Kind, Value};
+use crate::split::{self, Leaves, Splitter};
 
 use super::strain::{Base, Invariant};
 use super::{DeriveError, Session};
@@ -14,6 +15,43 @@ struct Parted {
 }
 
 impl Session {
+    /// The textbook energy with its volumetric part, if this vanishes to second order where J = 1, split there: a body
+    /// may keep its volume far from rest, and nearly incompressible ones do.
+    pub(super) fn split_at_unit_volume(&mut self, energy: Expr) -> Expr {
+        let used = self.strain.invariants();
+        let (Some(&(_, j)), Expr::Sum(terms)) = (used.iter().find(|(i, _)| *i == Invariant::J), &energy) else {
+            return energy;
+        };
+        let volumetric = |t: &Expr| {
+            let mut varying = t.symbols().into_iter().filter(|s| !self.quantities.is_constant(*s)).peekable();
+            varying.peek().is_some() && varying.all(|s| s == j)
+        };
+        let (volumetric, mut others): (Vec<Expr>, Vec<Expr>) = terms.iter().cloned().partition(volumetric);
+        let volumetric = Expr::Sum(volumetric);
+        // Polynomials in J - 1 lose nothing.
+        if self.quantities.is_polynomial(&volumetric) {
+            return energy;
+        }
+        let less_one = self.quantities.stage("J_less_1", Expr::from(j) - Expr::int(1));
+        let leaves = Leaves { others: vec![(j, split::linear(Expr::int(1), less_one))], ..Leaves::default() };
+        let splitter = Splitter::of_energy(&mut self.cas, &mut self.quantities, &mut self.rest, "energy_far", leaves);
+        let noted = splitter.rewrites();
+        let Some((value, rest)) = splitter.of_second_order(&volumetric) else {
+            self.rest.rewrites.truncate(noted);
+            return energy;
+        };
+        // Below 1/2 the differences from 1 would cancel.
+        let value = Value::Select {
+            left: j.into(),
+            right: Expr::ratio(1, 2),
+            then: value,
+            otherwise: volumetric - rest.clone(),
+        };
+        others.push(self.quantities.add("volumetric", Kind::Stage { value, partials: None }).into());
+        others.push(rest);
+        Expr::Sum(others)
+    }
+
     /// The energy counted from rest, with its functions of 1 + z computed from z; as it stands where there is none.
     pub(super) fn far_from(&mut self, energy: Expr, at_rest: &Expr) -> Result<Expr, DeriveError> {
         let mut found = false;
