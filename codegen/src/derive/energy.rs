@@ -195,7 +195,7 @@ impl<'a> Energy<'a> {
             },
             _ => None,
         };
-        let j = self.strain.jacobian_in_use();
+        let j = self.strain.used(Invariant::J);
         let (power, r, other) = match (broken_power(&a), broken_power(&b)) {
             (Some((s, r)), _) if Some(s) == j => (a.clone(), r, b.clone()),
             (_, Some((s, r))) if Some(s) == j => (b.clone(), r, a.clone()),

@@ -18,10 +18,7 @@ impl Session {
     /// The textbook energy with its volumetric part, if this vanishes to second order where J = 1, split there: a body
     /// may keep its volume far from rest, and nearly incompressible ones do.
     pub(super) fn split_at_unit_volume(&mut self, energy: Expr) -> Expr {
-        let used = self.strain.invariants();
-        let (Some(&(_, j)), Expr::Sum(terms)) = (used.iter().find(|(i, _)| *i == Invariant::J), &energy) else {
-            return energy;
-        };
+        let (Some(j), Expr::Sum(terms)) = (self.strain.used(Invariant::J), &energy) else { return energy };
         let volumetric = |t: &Expr| {
             let mut varying = t.symbols().into_iter().filter(|s| !self.quantities.is_constant(*s)).peekable();
             varying.peek().is_some() && varying.all(|s| s == j)

@@ -43,7 +43,7 @@ pub struct NearStress {
 impl Session {
     /// The energy split to second order, if a rule applies; and the energy at rest.
     pub(super) fn near_energy(&mut self) -> Result<(Option<NearEnergy>, Expr), DeriveError> {
-        let jacobian = self.strain.invariants().iter().find(|(i, _)| *i == Invariant::J).map(|&(_, j)| j);
+        let jacobian = self.strain.used(Invariant::J);
         let leaves = self.leaves(jacobian)?;
         let energy = self.energy.clone();
         let splitter = Splitter::of_energy(&mut self.cas, &mut self.quantities, &mut self.rest, "energy", leaves);
@@ -55,7 +55,7 @@ impl Session {
 
     /// Splits an expression as a part of the energy: for its refusal.
     pub(super) fn try_part(&mut self, e: &Expr) -> Result<(), DeriveError> {
-        let jacobian = self.strain.invariants().iter().find(|(i, _)| *i == Invariant::J).map(|&(_, j)| j);
+        let jacobian = self.strain.used(Invariant::J);
         let leaves = self.leaves(jacobian)?;
         let e = self.cas.normalize(e)?;
         let mut splitter = Splitter::of_energy(&mut self.cas, &mut self.quantities, &mut self.rest, "energy", leaves);
@@ -218,8 +218,7 @@ impl Session {
 
     /// I2, if in use, and tr A, II(A), 2 tr A + II(A): I2 = 3 + 2 tr A + II(A).
     fn near_second(&mut self) -> Result<Option<(Symbol, Symbol, Symbol, Symbol)>, DeriveError> {
-        let used = self.strain.invariants();
-        let Some(&(_, second)) = used.iter().find(|(i, _)| *i == Invariant::Second) else { return Ok(None) };
+        let Some(second) = self.strain.used(Invariant::Second) else { return Ok(None) };
         let (cas, quantities) = (&mut self.cas, &mut self.quantities);
         let [trace, square] = [Invariant::Trace(Base::A), Invariant::Ddot(Base::A, Base::A)]
             .map(|i| self.strain.invariant(cas, quantities, i));
@@ -234,7 +233,7 @@ impl Session {
     /// its stand-in: J with fewer roundings near rest (1 + j where j > -1/2), because they divide by it more than once;
     /// and selections by comparisons that are decided rightly near rest.
     pub(super) fn accurate(&mut self) -> Result<StandIns, DeriveError> {
-        let jacobian = self.strain.invariants().iter().find(|(i, _)| *i == Invariant::J).map(|&(_, j)| j);
+        let jacobian = self.strain.used(Invariant::J);
         let sums = self.strain.near_stretch_sums(&mut self.quantities);
         let selections = self.quantities.selections();
         let conditions = self.conditions.clone();

@@ -222,9 +222,9 @@ impl Strain {
         Ok(components)
     }
 
-    /// The symbol of J, if in use.
-    pub fn jacobian_in_use(&self) -> Option<Symbol> {
-        self.jacobian
+    /// The symbol of an invariant, if in use.
+    pub fn used(&self, invariant: Invariant) -> Option<Symbol> {
+        self.invariants.get(&invariant).copied()
     }
 
     /// The cofactors K = dJ/dF.
