@@ -1,7 +1,7 @@
 //! Kelvin-Voigt solid at finite strain: a logarithmic neo-Hookean spring beside a dashpot, whose stress is linear in
 //! the rate of the Green strain, S_v = 2 eta dE/dt + (zeta - 2/3 eta) tr(dE/dt) I.
 //! Spring: Bonet & Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed., eq. 6.27. Dashpot: Landau &
-//! Lifshitz, Theory of Elasticity, 3rd ed., eqs. 34.5 and 34.6, in E for the small strain, so that rotation is free.
+//! Lifshitz, Theory of Elasticity, 3rd ed., section 34, in E for the small strain, so that rotation is free.
 #[domain(J > 0.0)]
 #[small_strain_moduli(shear = shear_modulus(young, poisson), bulk = bulk_modulus(young, poisson))]
 struct Parameters {

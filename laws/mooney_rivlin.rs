@@ -1,5 +1,5 @@
 //! Compressible Mooney-Rivlin solid, W = mu1/2 (I1 - 3) + mu2/2 (I2 - 3) - (mu1 + 2 mu2) ln J + lambda/2 (ln J)^2.
-//! Holzapfel, Nonlinear Solid Mechanics, 2000, eq. 6.147, with lambda/2 (ln J)^2 for its c (J - 1)^2; mu1 and mu2 are
+//! Holzapfel, Nonlinear Solid Mechanics, 2000, section 6.5, with lambda/2 (ln J)^2 for its c (J - 1)^2; mu1 and mu2 are
 //! twice its c1 and c2. Small strains have the shear modulus mu1 + mu2 and the first Lame constant lambda + 2 mu2.
 #[domain(J > 0.0)]
 #[small_strain_moduli(shear = mu1 + mu2, lame_lambda = lambda + 2.0 * mu2)]

@@ -1,6 +1,6 @@
 //! Neo-Hookean solid with isochoric and volumetric parts apart, W = mu/2 (I1bar - 3) + K/2 (J - 1)^2.
-//! Li, Guo, Liu, Wang & Qin, A GPU-Accelerated Finite Element Solver for Simulation of Soft-Body Deformation, 2014,
-//! after Taylor, Cheng & Ourselin, IEEE Transactions on Medical Imaging 27(5), 2008.
+//! The model that Li, Guo, Liu, Wang & Qin, A GPU-Accelerated Finite Element Solver for Simulation of Soft-Body
+//! Deformation, 2014, take from Taylor, Cheng & Ourselin, IEEE Transactions on Medical Imaging 27(5), 2008.
 #[domain(J > 0.0)]
 #[small_strain_moduli(shear = shear_modulus(young, poisson), bulk = bulk_modulus(young, poisson))]
 struct Parameters {

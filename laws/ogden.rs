@@ -1,9 +1,10 @@
 //! Ogden solid of three terms in the modified principal stretches lambdabar_i = J^(-1/3) lambda_i:
 //! W = sum_p mu_p/alpha_p (lambdabar_1^alpha_p + lambdabar_2^alpha_p + lambdabar_3^alpha_p - 3)
 //!   + kappa/4 (J^2 - 1 - 2 ln J).
-//! Ogden, Proc. R. Soc. Lond. A 326, 565-584, 1972 (defaults: its fit to Treloar's vulcanised rubber); the volumetric part is
-//! that of Ogden, Proc. R. Soc. Lond. A 328, 567-583, 1972, with beta = -2 (Simo & Miehe 1992; Holzapfel, Nonlinear Solid
-//! Mechanics, 2000, section 6.5): its beta = 9 for rubber passes the range of single precision in strong compression.
+//! Ogden, Proc. R. Soc. Lond. A 326, 565-584, 1972 (defaults: its fit to Treloar's vulcanised rubber, in Pa as commonly
+//! rounded); the volumetric part is that of Ogden, Proc. R. Soc. Lond. A 328, 567-583, 1972, with beta = -2 (Simo & Miehe
+//! 1992; Holzapfel, Nonlinear Solid Mechanics, 2000, section 6.5): its beta = 9 for rubber passes the range of single
+//! precision in strong compression.
 //!
 //! The shear modulus at rest is half the sum of mu_p alpha_p. Terms with a positive and with a negative exponent are
 //! parameters apart, so that the range of neither holds 0, where mu/alpha is infinite. A term with mu = 0 is left out.

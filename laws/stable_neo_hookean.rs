@@ -1,7 +1,7 @@
 //! Stable neo-Hookean solid: its energy stays finite where elements are inverted.
-//! W = mu/2 (I1 - 3) + lambda/2 (J - alpha)^2 - mu/2 ln(I1 + 1).
+//! W = mu/2 (I1 - 3) + lambda/2 (J - alpha)^2 - mu/2 ln(I1 + 1) with alpha = 1 + 3 mu/(4 lambda).
 //! Smith, de Goes & Kim, Stable Neo-Hookean Flesh Simulation, ACM Transactions on Graphics 37(2), 2018,
-//! doi:10.1145/3180491, eq. 13 to 16: mu and lambda are those with which small strains agree with Hooke's law.
+//! doi:10.1145/3180491, section 3: mu and lambda are those with which small strains agree with Hooke's law.
 #[small_strain_moduli(shear = shear_modulus(young, poisson), bulk = bulk_modulus(young, poisson))]
 struct Parameters {
     /// Young's modulus.

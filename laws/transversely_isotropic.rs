@@ -1,8 +1,8 @@
 //! Transversely isotropic solid: a neo-Hookean ground and one family of fibres.
 //! Bonet & Burton, A simple orthotropic, transversely isotropic hyperelastic constitutive equation for large strain
 //! computations, Computer Methods in Applied Mechanics and Engineering 162, 1998. The constants are those with which
-//! its linearisation has the moduli below; nu is the contraction across for a stretch along the fibres, too. The material
-//! is stable at rest where 1 - nu > 2 nu^2 young / axial_young.
+//! its linearisation has the moduli below, with n = E/E_A (eq. 55g prints its inverse); nu is the contraction across
+//! for a stretch along the fibres, too. The material is stable at rest where 1 - nu > 2 nu^2 young / axial_young.
 #[domain(J > 0.0)]
 struct Parameters {
     /// Young's modulus across the fibres.

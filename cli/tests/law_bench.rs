@@ -66,8 +66,15 @@ fn replay_shows_a_state_again() {
     let row = rows.as_array().expect("a list").iter().find(|r| r["machine"] == "f32" && r["quantity"] == "P");
     let gate = row.and_then(|r| r["gate"].as_f64()).expect("a number");
     assert_eq!(format!("{gate:.3e}"), times);
+    // The roundings explain it: they are listed by weight, and their sum is of the error's size.
+    let row = row.expect("found above");
+    let expected = row["expected"].as_f64().expect("a number");
+    assert!(expected > gate / 10.0, "{expected} of {gate}");
+    let weights = row["roundings"].as_array().expect("a list").iter().map(|r| r[1].as_f64().expect("a weight"));
+    assert!(weights.is_sorted_by(|a, b| a >= b), "{row}");
     let (text, _) = check(3, &arguments);
     assert!(text.contains("quantity  in") && text.contains(" only "), "{text}");
+    assert!(text.contains("by the roundings of"), "{text}");
     let few = check(2, &["replay", LINEAR, "--gradient=1,2"]).1;
     assert!(few.contains("--gradient has 2 numbers"), "{few}");
     let outside = check(2, &["replay", "neo_hookean", "--gradient=-2,0,0,0,0,0,0,0,0"]).1;

@@ -33,6 +33,9 @@ impl Constants {
     }
 }
 
+/// From this power on the reciprocal of a power is computed instead of the power of a reciprocal.
+const SHARED_RECIPROCAL: i128 = 5;
+
 /// A factor that costs nothing at run time: a number times expressions in the parameters.
 #[derive(Debug, Clone, PartialEq)]
 struct Coefficient {
@@ -316,8 +319,15 @@ impl<'a, N: FnMut(&Expr) -> Expr> Lowering<'a, N> {
                 numerator.push(self.integer_power(base, n as u128));
             } else if n < 0 {
                 n = -n;
-                let reciprocal = self.builder.recip(base);
-                reciprocals.push(self.integer_power(reciprocal, n as u128));
+                // One reciprocal is shared by low powers, whose errors it makes alike; in high ones its rounding counts n
+                // times.
+                reciprocals.push(if n < SHARED_RECIPROCAL {
+                    let reciprocal = self.builder.recip(base);
+                    self.integer_power(reciprocal, n as u128)
+                } else {
+                    let power = self.integer_power(base, n as u128);
+                    self.builder.recip(power)
+                });
             }
         }
         let mut factors = numerator.into_iter().chain(reciprocals);

@@ -6,6 +6,7 @@ use tensormass_codegen::ir::{Number, Rational};
 use tensormass_codegen::law::ast::{Law, Scalar};
 use tensormass_codegen::law::evaluate;
 
+use crate::dissipation::Moving;
 use crate::edge::edge;
 use crate::exact::{ExactLaw, difference, exact};
 use crate::extremes::{ExtremesError, Options, extremes};
@@ -100,6 +101,7 @@ pub fn check(subject: &Subject, options: Options, device: Result<&Device, String
     }
     findings.push(stability(subject, &materials));
     findings.extend(identities(subject, &materials, options.seed));
+    findings.extend(dissipation(subject, &materials, options.seed));
     findings.push(domain(subject, &materials, options.seed));
     findings.push(precision(subject, options, device)?);
     Ok(Report { law: subject.name().to_string(), materials, findings })
@@ -252,6 +254,53 @@ fn identities(subject: &Subject, materials: &[Material], seed: u64) -> Vec<Findi
     findings
 }
 
+/// An identity of dissipations.
+type OfRates = (&'static str, fn(&Moving) -> f64, f64);
+
+const OF_RATES: [OfRates; 5] = [
+    ("nothing is damped at rest", |at| at.rest(), IDENTITY),
+    ("damping is the derivative of dissipation", |at| at.dissipation_and_damping(), DIFFERENCE),
+    ("ddamping is the derivative of damping", |at| at.damping_and_differential(), DIFFERENCE),
+    ("symmetric damping", |at| at.symmetry(), IDENTITY),
+    ("dissipation is not negative", |at| at.negative(), IDENTITY),
+];
+
+/// The dissipation's identities at random states and rates.
+fn dissipation(subject: &Subject, materials: &[Material], seed: u64) -> Vec<Finding> {
+    if !subject.derivation.is_dissipative() {
+        return vec![note("dissipation", "none is declared".into())];
+    }
+    let laws: Vec<ExactLaw> = materials.iter().map(|m| ExactLaw::new(&subject.derivation, m)).collect();
+    let mut states = vec![];
+    for (m, law) in laws.iter().enumerate() {
+        for (s, strain) in STRAINS.iter().enumerate() {
+            let mut random = Random::new(&[seed, 4, m as u64, s as u64]);
+            let g = exact(&random.gradient(*strain, ROTATIONS[TURNS[s % TURNS.len()]], s));
+            if law.inside(&g) {
+                states.push(Moving::new(law, g, &mut random));
+            }
+        }
+    }
+    let worst = |f: fn(&Moving) -> f64| {
+        states.iter().map(f).map(|x| if x.is_nan() { f64::INFINITY } else { x }).fold(0.0, f64::max)
+    };
+    let detail = |worst: f64, allowed: f64| format!("{worst:.1e} at {} states, {allowed:.0e} is allowed", states.len());
+    let mut findings: Vec<Finding> = OF_RATES
+        .iter()
+        .map(|(name, f, bound)| {
+            let worst = worst(*f);
+            finding(name, !states.is_empty() && worst <= *bound, detail(worst, *bound))
+        })
+        .collect();
+    let (name, objectivity) = ("objective damping", worst(|at| at.objectivity()));
+    findings.push(if objectivity > IDENTITY && subject.law.small_strain {
+        note(name, format!("no, as of every law of the small strain: {objectivity:.1e} of the stress under rotations"))
+    } else {
+        finding(name, objectivity <= IDENTITY, detail(objectivity, IDENTITY))
+    });
+    findings
+}
+
 fn domain(subject: &Subject, materials: &[Material], seed: u64) -> Finding {
     let name = "edge of the domain";
     let Some(domain) = &subject.law.domain else { return note(name, "the law holds everywhere".into()) };
@@ -331,7 +380,8 @@ mod tests {
             let options = Options { samples: 0, seed: 3 };
             let report = check(&subject, options, Err("not asked for".into())).expect("a material");
             assert!(report.failed().is_empty(), "{}: {:?}", entry.info.name, report.findings);
-            assert_eq!(report.findings.len() - report.materials.len(), 12, "every finding is made, once");
+            let of_rates = if subject.derivation.is_dissipative() { OF_RATES.len() + 1 } else { 1 };
+            assert_eq!(report.findings.len() - report.materials.len(), 12 + of_rates, "every finding is made, once");
         }
     }
 }

@@ -86,6 +86,21 @@ impl<'a> ExactLaw<'a> {
         matrix(self.values("cauchy", g, &[]))
     }
 
+    /// D at a rate of G.
+    pub fn dissipation(&self, g: &Matrix, rate: &Matrix) -> Exact {
+        self.values("dissipation", g, &[(Input::GradientRate, rate)]).remove(0)
+    }
+
+    /// P_v at a rate of G.
+    pub fn damping(&self, g: &Matrix, rate: &Matrix) -> Matrix {
+        matrix(self.values("damping", g, &[(Input::GradientRate, rate)]))
+    }
+
+    /// dP_v in the direction D of the rate.
+    pub fn damping_differential(&self, g: &Matrix, rate: &Matrix, d: &Matrix) -> Matrix {
+        matrix(self.values("ddamping", g, &[(Input::GradientRate, rate), (Input::GradientIncrement, d)]))
+    }
+
     /// What the printed kernel of this name gives, exactly, in the place of the textbook form.
     pub fn printed(&self, kernel: &str, g: &Matrix, more: &[(Input, &[Exact])]) -> Vec<Exact> {
         printed(self.derivation, kernel, &self.inputs(g, more)).value

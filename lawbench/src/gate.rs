@@ -43,13 +43,19 @@ impl Machine {
         }
     }
 
-    /// Unit round-off, and the least and the greatest normal number.
-    fn numbers(self) -> (f64, f64, f64) {
+    /// Unit round-off.
+    pub fn round_off(self) -> f64 {
         match self {
-            Self::F32 | Self::Wgsl => {
-                (f64::from(f32::EPSILON) / 2.0, f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX))
-            }
-            Self::F64 => (f64::EPSILON / 2.0, f64::MIN_POSITIVE, f64::MAX),
+            Self::F32 | Self::Wgsl => f64::from(f32::EPSILON) / 2.0,
+            Self::F64 => f64::EPSILON / 2.0,
+        }
+    }
+
+    /// The least and the greatest normal number.
+    fn normal(self) -> (f64, f64) {
+        match self {
+            Self::F32 | Self::Wgsl => (f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)),
+            Self::F64 => (f64::MIN_POSITIVE, f64::MAX),
         }
     }
 }
@@ -146,19 +152,22 @@ impl Reference {
         &self.values[quantity as usize]
     }
 
+    /// What a value may be off by.
+    pub fn bound(&self, machine: Machine, quantity: Quantity) -> Exact {
+        let granted = if machine == Machine::Wgsl { 2.0 } else { 1.0 };
+        let k = granted * if quantity == Quantity::W { 8.0 } else { 4.0 };
+        let ku = Exact::from(k * machine.round_off());
+        let bound = self.first[quantity as usize].mul(&ku);
+        if quantity == Quantity::W { ku.mul(&ku).fma(&self.second, &bound) } else { bound }
+    }
+
     /// How far a machine's value is off; none where the gate makes no promise.
     pub fn measure(&self, machine: Machine, quantity: Quantity, computed: &[f64]) -> Option<Measure> {
         if self.undecided[usize::from(machine == Machine::F64)] {
             return None;
         }
-        let (round_off, least, greatest) = machine.numbers();
-        let granted = if machine == Machine::Wgsl { 2.0 } else { 1.0 };
-        let k = granted * if quantity == Quantity::W { 8.0 } else { 4.0 };
-        let ku = Exact::from(k * round_off);
-        let mut bound = self.first[quantity as usize].mul(&ku);
-        if quantity == Quantity::W {
-            bound = ku.mul(&ku).fma(&self.second, &bound);
-        }
+        let (least, greatest) = machine.normal();
+        let bound = self.bound(machine, quantity);
         let value = self.value(quantity);
         let size = Exact::norm(value);
         let normal = |x: &Exact| !Exact::from(least).greater(x) && !x.greater(&Exact::from(greatest));

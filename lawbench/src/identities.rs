@@ -42,28 +42,15 @@ impl<'a> At<'a> {
     /// P : D against the derivative of W.
     pub fn energy_and_force(&self) -> f64 {
         let power = ddot(&self.stress, &self.d);
-        let rate = self.derivative(|g| vec![self.law.energy(g)]);
+        let rate = derivative(&self.g, &self.d, |g| vec![self.law.energy(g)]);
         difference(&rate, &[power], &self.scale.mul(&Exact::norm(&self.d)))
     }
 
     /// dP against the derivative of P.
     pub fn force_and_dforce(&self) -> f64 {
         let differential = self.law.differential(&self.g, &self.d);
-        let rate = self.derivative(|g| self.law.stress(g).to_vec());
+        let rate = derivative(&self.g, &self.d, |g| self.law.stress(g).to_vec());
         difference(&rate, &differential, &self.stiffness.mul(&Exact::norm(&self.d)))
-    }
-
-    /// The derivative along D: central differences over h and h / 2, extrapolated (Richardson).
-    fn derivative(&self, f: impl Fn(&Matrix) -> Vec<Exact>) -> Vec<Exact> {
-        let over = |h: &Exact| -> Vec<Exact> {
-            let (ahead, behind) = (f(&moved(&self.g, h, &self.d)), f(&moved(&self.g, &h.neg(), &self.d)));
-            let twice = h.add(h);
-            ahead.iter().zip(&behind).map(|(a, b)| a.sub(b).div(&twice)).collect()
-        };
-        let h = Exact::power_of_ten(-24);
-        let (wide, narrow) = (over(&h), over(&h.mul(&Exact::from(0.5))));
-        let (four, three) = (Exact::from(4.0), Exact::from(3.0));
-        wide.iter().zip(&narrow).map(|(w, n)| four.mul(n).sub(w).div(&three)).collect()
     }
 
     /// The tangent against its transpose.
@@ -126,4 +113,17 @@ impl<'a> At<'a> {
             .max(difference(&stress, &self.stress, scale))
             .max(difference(&differential, &self.law.differential(&self.g, &self.d), &stiffness))
     }
+}
+
+/// The derivative of `f` at G along D: central differences over h and h / 2, extrapolated (Richardson).
+pub fn derivative(g: &Matrix, d: &Matrix, f: impl Fn(&Matrix) -> Vec<Exact>) -> Vec<Exact> {
+    let over = |h: &Exact| -> Vec<Exact> {
+        let (ahead, behind) = (f(&moved(g, h, d)), f(&moved(g, &h.neg(), d)));
+        let twice = h.add(h);
+        ahead.iter().zip(&behind).map(|(a, b)| a.sub(b).div(&twice)).collect()
+    };
+    let h = Exact::power_of_ten(-24);
+    let (wide, narrow) = (over(&h), over(&h.mul(&Exact::from(0.5))));
+    let (four, three) = (Exact::from(4.0), Exact::from(3.0));
+    wide.iter().zip(&narrow).map(|(w, n)| four.mul(n).sub(w).div(&three)).collect()
 }

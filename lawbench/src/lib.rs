@@ -11,6 +11,7 @@
 pub mod check;
 pub mod csv;
 pub mod curve;
+mod dissipation;
 pub mod drive;
 mod edge;
 pub mod evaluate;
@@ -24,6 +25,7 @@ mod lanes;
 pub mod material;
 pub mod number;
 pub mod replay;
+pub mod roundings;
 pub mod states;
 pub mod subject;
 mod svg;

@@ -89,5 +89,12 @@ fn page(subject: &Subject, rows: &[Row]) -> String {
             lines.push(line);
         }
     }
-    format!("{}\n{}", subject.name(), text::columns("  ", &lines))
+    let mut told = vec![["quantity", "in", "expected", "by the roundings of"].map(String::from).to_vec()];
+    for row in rows {
+        let most = row.roundings.iter().map(|(what, weight)| format!("{what} {}", table::short(Some(*weight))));
+        let (quantity, machine) = (row.quantity.name().to_string(), row.machine.name().to_string());
+        told.push(vec![quantity, machine, table::short(Some(row.expected)), most.collect::<Vec<_>>().join(", ")]);
+    }
+    let (values, told) = (text::columns("  ", &lines), text::columns("  ", &told));
+    format!("{}\n{values}\nOf the gate's bounds, for roundings of one unit round-off each:\n{told}", subject.name())
 }

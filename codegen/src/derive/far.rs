@@ -1,11 +1,12 @@
 //! The energy far from rest: textbook but for ln(1 + z), exp(z) - 1 and (1 + z)^r - 1, whose small z would lose digits
 //! wherever a law is nearly linear in it, as Gent's is in (I1bar - 3) / J_m; and but for volumetric parts at J = 1.
 
-use crate::expr::{Expr, Rational};
+use crate::expr::Expr;
+use crate::ir::Input;
 use crate::quantity::{Kind, Value};
 use crate::split::{self, Leaves, Splitter};
 
-use super::strain::{Base, Invariant};
+use super::strain::Invariant;
 use super::{DeriveError, Session};
 
 /// An expression as a constant and what is added to it.
@@ -133,10 +134,13 @@ impl Session {
         Some(match e {
             Expr::Number(_) => e.clone(),
             Expr::Symbol(s) => {
-                if let Some((invariant, _)) = self.strain.invariants().iter().find(|(_, q)| q == s) {
-                    return Some(Expr::Number(rest_of(*invariant)));
+                // Three stretches, which are 1; their stages choose between rotations.
+                if matches!(self.strain.invariants().iter().find(|(_, q)| q == s), Some((Invariant::StretchSum(_), _)))
+                {
+                    return Some(Expr::int(3));
                 }
                 match &self.quantities.get(*s).kind {
+                    Kind::Input(Input::DisplacementGradient, _) => Expr::int(0),
                     Kind::Stage { value: Value::Expr(value), .. } => self.at_rest(value)?,
                     Kind::Stage { value: Value::Select { .. }, .. } => return None,
                     Kind::Constant(_) | Kind::Input(..) => e.clone(),
@@ -150,15 +154,4 @@ impl Session {
             Expr::Log1p(_) | Expr::Expm1(_) | Expr::Log1pmx(_) | Expr::Expm1mx(_) => return None,
         })
     }
-}
-
-/// An invariant's value at rest.
-fn rest_of(invariant: Invariant) -> Rational {
-    Rational::from_integer(match invariant {
-        Invariant::J | Invariant::Det(Base::C) => 1,
-        Invariant::Trace(Base::C) | Invariant::Ddot(Base::C, Base::C) => 3,
-        Invariant::Second | Invariant::StretchSum(_) => 3,
-        Invariant::Trace(_) | Invariant::Ddot(..) | Invariant::Det(_) => 0,
-        Invariant::Fibre(..) | Invariant::FibrePair(..) | Invariant::FibreSquare(..) => 0,
-    })
 }

@@ -6,6 +6,7 @@
 //! (a staged tangent), so that no expression grows. The computer algebra system takes every partial derivative.
 
 mod damping;
+mod deformed;
 mod differential;
 mod energy;
 mod far;
@@ -82,6 +83,8 @@ struct Session {
     conditions: Vec<(Expr, Expr)>,
     /// Whether a broken power of J multiplies what depends on the strain.
     isochoric: bool,
+    /// Whether the derivative of the energy by tr A depends on the strain.
+    curved: bool,
     /// The symbols of the parameters' components, parameter by parameter.
     parameters: Vec<Vec<Symbol>>,
 }
@@ -128,6 +131,7 @@ impl Session {
             far_margin,
             conditions,
             isochoric,
+            curved: false,
             parameters,
         };
         Ok((session, others))
@@ -142,7 +146,6 @@ impl Session {
         let increment = self.stress_increment(&stress, &gradient, &dgradient)?;
         let node = vector(&mut self.quantities, "g", NodeGradient, 3);
         let diagonal = self.diagonal(&stress, &gradient, &node)?;
-        let cauchy = self.cauchy(&stress);
         let (near_energy, at_rest) = self.near_energy()?;
         let near_stress = self.near_stress(&stress)?;
         let far_energy = self.far_energy.clone();
@@ -177,7 +180,8 @@ impl Session {
                 let mut outputs = with_margin(Output::Stress, near.stress.to_vec(), &near.margin);
                 outputs.push((Output::NearRest, vec![near.holds.clone()]));
                 point.push(self.lower("force", &[G], outputs));
-                point.push(self.lower("force_far", &[G], with_margin(Output::Stress, stress.to_vec(), &far_margin)));
+                let far_stress = self.of_deformation(&stress)?;
+                point.push(self.lower("force_far", &[G], with_margin(Output::Stress, far_stress, &far_margin)));
             }
             None => point.push(self.lower("force", &[G], with_margin(Output::Stress, stress.to_vec(), &margin))),
         }
@@ -193,18 +197,33 @@ impl Session {
                 let near = vec![(Output::StressIncrement, increment), (Output::NearRest, vec![holds])];
                 let instead = [accurate.as_slice(), &split].concat();
                 point.push(self.lower_with("dforce", &[G, GradientIncrement], near, &instead));
-                point.push(self.lower("dforce_far", &[G, GradientIncrement], outputs));
+                let far_increment = vec![(Output::StressIncrement, self.of_deformation(&outputs[0].1)?)];
+                point.push(self.lower("dforce_far", &[G, GradientIncrement], far_increment));
             }
-            None => point.push(self.lower_with("dforce", &[G, GradientIncrement], outputs, &accurate)),
+            None => match &near_stress {
+                // 3 + tr A in it would lose tr C.
+                Some(near) if self.curved => {
+                    let far_increment = vec![(Output::StressIncrement, self.of_deformation(&outputs[0].1)?)];
+                    let near = [outputs, vec![(Output::NearRest, vec![near.holds.clone()])]].concat();
+                    point.push(self.lower_with("dforce", &[G, GradientIncrement], near, &accurate));
+                    point.push(self.lower("dforce_far", &[G, GradientIncrement], far_increment));
+                }
+                _ => point.push(self.lower_with("dforce", &[G, GradientIncrement], outputs, &accurate)),
+            },
         }
         point.push(self.lower_with("diagonal", &[G, NodeGradient], vec![(Output::Diagonal, diagonal)], &accurate));
         match near_stress {
             Some(near) => {
                 let outputs = vec![(Output::Cauchy, near.cauchy), (Output::NearRest, vec![near.holds])];
                 point.push(self.lower("cauchy", &[G], outputs));
+                let cauchy = self.cauchy(&stress);
+                let cauchy = self.of_deformation(&cauchy)?;
                 point.push(self.lower("cauchy_far", &[G], vec![(Output::Cauchy, cauchy)]));
             }
-            None => point.push(self.lower("cauchy", &[G], vec![(Output::Cauchy, cauchy)])),
+            None => {
+                let cauchy = self.cauchy(&stress);
+                point.push(self.lower("cauchy", &[G], vec![(Output::Cauchy, cauchy)]));
+            }
         }
         // Last: what a law without a dissipation has does not depend on there being such a thing.
         if let Some(dissipation) = &law.dissipation {
@@ -288,6 +307,7 @@ impl Session {
                 self.quantities.stage(name, w).into()
             };
             if !w.is_zero() {
+                self.curved |= invariant == Invariant::Trace(Invariant::OF_C) && !self.quantities.is_constant_expr(&w);
                 weights.push((invariant, q, w));
             }
         }

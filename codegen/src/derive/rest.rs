@@ -15,6 +15,9 @@ const GREATEST_STRAIN: (i128, i128) = (16, 1);
 /// With principal stretches, whose squares are 1 + a_p with errors of the greatest a_p: up to A:A = 4.
 const GREATEST_STRETCH: (i128, i128) = (4, 1);
 
+/// Over G without a bound on the strain: up to J = 4, from where on what is split off is the lesser part.
+const GREATEST_VOLUME: i128 = 4;
+
 /// Pairs of a quantity and what is computed for it.
 pub type StandIns = Vec<(Symbol, Symbol)>;
 
@@ -266,19 +269,35 @@ impl Session {
         Ok(pairs)
     }
 
-    /// Positive where j >= -1/2 and, if the strain is bounded too, E:E <= 4.
+    /// Positive near rest: where J is between 1/2 and 4, and, if the strain is bounded too, where E:E <= 4. Where there is no
+    /// J, tr C > 2 stands for a body that is not compressed to almost nothing.
     fn near_rest(&mut self, jacobian: Option<Expr>, bounded: bool) -> Result<Expr, DeriveError> {
-        let above_half = jacobian.map(|j| j - Expr::ratio(1, 2));
-        if !bounded && let Some(above_half) = above_half {
-            return Ok(above_half);
-        }
-        let square = self.strain.invariant(&mut self.cas, &mut self.quantities, Invariant::Ddot(Base::A, Base::A))?;
-        let (n, d) = if self.strain.has_stretch_sums() { GREATEST_STRETCH } else { GREATEST_STRAIN };
-        let small = Expr::ratio(n, d) - Expr::from(square);
-        let Some(above_half) = above_half else { return Ok(small) };
-        let least =
-            Value::Select { left: small.clone(), right: above_half.clone(), then: above_half, otherwise: small };
-        let least: Symbol = self.quantities.add("near_rest", Kind::Stage { value: least, partials: None });
-        Ok(least.into())
+        let (cas, quantities) = (&mut self.cas, &mut self.quantities);
+        let small = if bounded {
+            let square = self.strain.invariant(cas, quantities, Invariant::Ddot(Base::A, Base::A))?;
+            let (n, d) = if self.strain.has_stretch_sums() { GREATEST_STRETCH } else { GREATEST_STRAIN };
+            Some(Expr::ratio(n, d) - Expr::from(square))
+        } else {
+            None
+        };
+        // A product serves where both factors cannot be negative.
+        Ok(match (jacobian, small) {
+            (Some(j), None) => {
+                let (above, below) = (j.clone() - Expr::ratio(1, 2), Expr::int(GREATEST_VOLUME) - j);
+                above * below
+            }
+            (Some(j), Some(small)) => {
+                let above = j - Expr::ratio(1, 2);
+                let (left, right) = (small.clone(), above.clone());
+                let value = Value::Select { left, right, then: above, otherwise: small };
+                quantities.add("near_rest", Kind::Stage { value, partials: None }).into()
+            }
+            // tr A > -1 wherever A:A >= 16: no eigenvalue is below -1.
+            (None, small) => {
+                let trace = self.strain.invariant(cas, quantities, Invariant::Trace(Base::A))?;
+                let above = Expr::int(1) + trace.into();
+                small.map_or(above.clone(), |small| small * above)
+            }
+        })
     }
 }

@@ -178,7 +178,13 @@ impl Strain {
         self.bases.get(&base).copied()
     }
 
-    fn base(&mut self, cas: &mut Cas, quantities: &mut Quantities, base: Base) -> Result<[Symbol; 6], UnexpectedTerm> {
+    /// The components of a base tensor, made on first use.
+    pub fn tensor(
+        &mut self,
+        cas: &mut Cas,
+        quantities: &mut Quantities,
+        base: Base,
+    ) -> Result<[Symbol; 6], UnexpectedTerm> {
         if let Some(&components) = self.bases.get(&base) {
             return Ok(components);
         }
@@ -288,7 +294,7 @@ impl Strain {
         let mut rates = BTreeMap::new();
         for (base, rate) in [(Base::A, Base::RateA), (Base::Eps, Base::RateEps)] {
             if let Some(components) = self.components(base) {
-                let rate = self.base(cas, quantities, rate)?;
+                let rate = self.tensor(cas, quantities, rate)?;
                 rates.extend(components.into_iter().zip(rate.map(Expr::from)));
             }
         }
@@ -318,7 +324,7 @@ impl Strain {
             Invariant::J => self.jacobian(cas, quantities),
             Invariant::Second => {
                 let trace = self.invariant(cas, quantities, Invariant::Trace(Base::A))?;
-                let a = self.base(cas, quantities, Base::A)?;
+                let a = self.tensor(cas, quantities, Base::A)?;
                 let cofactors = self.cofactors(cas, quantities);
                 // dI2/dC = I1 I - C = (2 + tr A) I - A; an off-diagonal component stands for two.
                 let partials = SYMMETRIC.iter().zip(a).map(|(&(i, j), component)| {
@@ -335,29 +341,29 @@ impl Strain {
                 quantities.add("I2", Kind::Stage { value, partials })
             }
             Invariant::StretchSum(k) => {
-                let c = self.base(cas, quantities, Base::A)?;
+                let c = self.tensor(cas, quantities, Base::A)?;
                 let spectrum =
                     self.spectrum.get_or_insert_with(|| Spectrum::of_deformation(quantities, self.deformation, c));
                 spectrum.stretch_sum(quantities, &self.exponents[k])
             }
             Invariant::Fibre(d) => {
-                let c = self.base(cas, quantities, Base::A)?;
+                let c = self.tensor(cas, quantities, Base::A)?;
                 fibre::pair(quantities, &c, d, d)
             }
             Invariant::FibrePair(d, e) => {
-                let c = self.base(cas, quantities, Base::A)?;
+                let c = self.tensor(cas, quantities, Base::A)?;
                 fibre::pair(quantities, &c, d, e)
             }
             Invariant::FibreSquare(d) => {
-                let c = self.base(cas, quantities, Base::A)?;
+                let c = self.tensor(cas, quantities, Base::A)?;
                 fibre::square(quantities, &c, d)
             }
             Invariant::Trace(b) => {
-                let c = self.base(cas, quantities, b)?;
+                let c = self.tensor(cas, quantities, b)?;
                 quantities.stage(format!("tr{}", label(b)), Expr::Sum(c[..3].iter().map(|&s| s.into()).collect()))
             }
             Invariant::Ddot(x, y) => {
-                let (a, b) = (self.base(cas, quantities, x)?, self.base(cas, quantities, y)?);
+                let (a, b) = (self.tensor(cas, quantities, x)?, self.tensor(cas, quantities, y)?);
                 let term = |k: usize| {
                     let twice = if SYMMETRIC[k].0 == SYMMETRIC[k].1 { 1 } else { 2 };
                     Expr::Product(vec![Expr::int(twice), a[k].into(), b[k].into()])
@@ -366,7 +372,7 @@ impl Strain {
                 quantities.stage(format!("{}_{}", label(x), label(y)), e)
             }
             Invariant::Det(b) => {
-                let c = self.base(cas, quantities, b)?.map(Expr::from);
+                let c = self.tensor(cas, quantities, b)?.map(Expr::from);
                 let [xx, yy, zz, xy, xz, yz] = c;
                 let two = Rational::from_integer(2);
                 let e = xx.clone() * yy.clone() * zz.clone() + Expr::int(2) * (xy.clone() * xz.clone() * yz.clone())

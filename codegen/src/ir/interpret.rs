@@ -172,6 +172,16 @@ impl ValidKernel {
     /// # Errors
     /// An input array is missing or has the wrong length.
     pub fn interpret<T: Number>(&self, inputs: &[(Input, &[T])]) -> Result<Vec<Vec<T>>, InterpretError> {
+        let v = self.values(inputs)?;
+        let outputs = self.ir().outputs.iter();
+        Ok(outputs.map(|(_, ids)| ids.iter().map(|id| v[id.index()].clone()).collect()).collect())
+    }
+
+    /// Evaluates every value of the kernel, in order.
+    ///
+    /// # Errors
+    /// See [`ValidKernel::interpret`].
+    pub fn values<T: Number>(&self, inputs: &[(Input, &[T])]) -> Result<Vec<T>, InterpretError> {
         let ir = self.ir();
         for &(role, needed) in &ir.inputs {
             let given = inputs.iter().find(|(r, _)| *r == role).map_or(0, |(_, a)| a.len());
@@ -207,6 +217,6 @@ impl ValidKernel {
             };
             v.push(value);
         }
-        Ok(ir.outputs.iter().map(|(_, ids)| ids.iter().map(|id| v[id.index()].clone()).collect()).collect())
+        Ok(v)
     }
 }

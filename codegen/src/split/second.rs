@@ -4,10 +4,8 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use num_traits::{One, Zero};
-
 use crate::cas::Cas;
-use crate::expr::{Expr, Rational, Symbol};
+use crate::expr::{Expr, Symbol};
 use crate::quantity::Quantities;
 
 use super::{Order, Rest, Split, SplitError, Splitter, total};
@@ -158,7 +156,7 @@ impl<'a> Splitter<'a> {
         if seconds.iter().all(|s| s.is_whole) {
             return Ok(Second { linear, remainder: change.clone(), order, is_whole: true });
         }
-        let remainder = merged(total(seconds.iter().map(|s| s.remainder.clone())));
+        let remainder = self.merged(total(seconds.iter().map(|s| s.remainder.clone())))?;
         Ok(Second { linear, remainder, order, is_whole: false })
     }
 
@@ -226,6 +224,22 @@ impl<'a> Splitter<'a> {
         Ok(Second { linear, remainder: total([remainder, curved].into_iter()), order, is_whole: false })
     }
 
+    /// A sum with equal terms merged: the constants before them cancel here, not when they are computed.
+    fn merged(&mut self, e: Expr) -> Result<Expr, SplitError> {
+        let terms = gathered(&e, &|e: &Expr| self.quantities.is_constant_expr(e));
+        if terms.iter().all(|(factors, _)| factors.len() == 1) {
+            return Ok(e);
+        }
+        let mut merged = vec![];
+        for (factors, varying) in terms {
+            let factor = self.simplify(Expr::Sum(factors))?;
+            if !factor.is_zero() {
+                merged.push(factor * varying);
+            }
+        }
+        Ok(total(merged.into_iter()))
+    }
+
     fn linear(&mut self, terms: impl Iterator<Item = (Symbol, Expr)>) -> Result<BTreeMap<Symbol, Expr>, SplitError> {
         let mut linear = BTreeMap::new();
         for (s, c) in terms {
@@ -238,31 +252,29 @@ impl<'a> Splitter<'a> {
     }
 }
 
-/// A sum with its numbers multiplied in and equal terms merged: what cancels does so here.
-fn merged(e: Expr) -> Expr {
-    fn collect(e: &Expr, factor: Rational, terms: &mut Vec<(Rational, Expr)>) {
-        match e {
-            Expr::Sum(parts) => parts.iter().for_each(|part| collect(part, factor, terms)),
-            Expr::Product(factors) => match factors.as_slice() {
-                [Expr::Number(q), rest] | [rest, Expr::Number(q)] => collect(rest, factor * q, terms),
-                [Expr::Number(q), rest @ ..] => add(Expr::Product(rest.to_vec()), factor * q, terms),
-                _ => add(e.clone(), factor, terms),
-            },
-            Expr::Number(q) => add(Expr::int(1), factor * q, terms),
-            _ => add(e.clone(), factor, terms),
-        }
-    }
-    fn add(e: Expr, factor: Rational, terms: &mut Vec<(Rational, Expr)>) {
-        match terms.iter_mut().find(|(_, x)| *x == e) {
-            Some((sum, _)) => *sum += factor,
-            None => terms.push((factor, e)),
+/// The terms of a sum, each as its constant factor and what varies, equal ones of which are merged.
+fn gathered(e: &Expr, is_constant: &impl Fn(&Expr) -> bool) -> Vec<(Vec<Expr>, Expr)> {
+    fn collect(e: &Expr, factor: &Expr, is_constant: &impl Fn(&Expr) -> bool, terms: &mut Vec<(Vec<Expr>, Expr)>) {
+        let (factor, varying) = match e {
+            Expr::Sum(parts) => return parts.iter().for_each(|part| collect(part, factor, is_constant, terms)),
+            Expr::Product(factors) => {
+                let (constants, varying): (Vec<Expr>, Vec<Expr>) = factors.iter().cloned().partition(is_constant);
+                let factor = constants.into_iter().fold(factor.clone(), |product, c| product * c);
+                match varying.as_slice() {
+                    // One that varies may be a sum or a product itself.
+                    [one] => return collect(one, &factor, is_constant, terms),
+                    _ => (factor, Expr::Product(varying)),
+                }
+            }
+            e if is_constant(e) => (factor.clone() * e.clone(), Expr::int(1)),
+            _ => (factor.clone(), e.clone()),
+        };
+        match terms.iter_mut().find(|(_, x)| *x == varying) {
+            Some((factors, _)) => factors.push(factor),
+            None => terms.push((vec![factor], varying)),
         }
     }
     let mut terms = vec![];
-    collect(&e, Rational::one(), &mut terms);
-    if terms.iter().all(|(q, _)| !q.is_zero()) {
-        return e;
-    }
-    let product = |(q, e): (Rational, Expr)| if q.is_one() { e } else { Expr::Number(q) * e };
-    total(terms.into_iter().filter(|(q, _)| !q.is_zero()).map(product))
+    collect(e, &Expr::int(1), is_constant, &mut terms);
+    terms
 }

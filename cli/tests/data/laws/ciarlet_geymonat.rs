@@ -1,6 +1,6 @@
-//! Polyconvex solid of given Lame constants, W = a (I1 - 3) + b (I2 - 3) + c (I3 - 1) - d/2 ln I3 with a + b = mu/2,
-//! c = lambda/4 - b, d = lambda/2 + mu.
-//! Ciarlet, Mathematical Elasticity I, 1988, theorem 4.10-2.
+//! Solid of given Lame constants, W = a (I1 - 3) + b (I2 - 3) + c (I3 - 1) - d/2 ln I3 with a + b = mu/2,
+//! c = lambda/4 - b, d = lambda/2 + mu; polyconvex where b is at most mu/2 and lambda/4.
+//! Ciarlet, Mathematical Elasticity I, 1988, section 4.10.
 #[domain(J > 0.0)]
 #[small_strain_moduli(shear = mu, lame_lambda = lambda)]
 struct Parameters {

@@ -1,5 +1,5 @@
 //! Exponential solid, W = mu/(2 b) (exp(b (I1bar - 3)) - 1) + kappa/2 (J - 1)^2.
-//! Demiray, A note on the elasticity of soft biological tissues, Journal of Biomechanics 5, 1972, eq. 6.
+//! Demiray, A note on the elasticity of soft biological tissues, Journal of Biomechanics 5, 1972; incompressible there.
 #[domain(J > 0.0)]
 #[small_strain_moduli(shear = mu, bulk = kappa)]
 struct Parameters {

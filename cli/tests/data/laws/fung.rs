@@ -1,5 +1,5 @@
 //! Exponential of a quadratic form of the Green strain, W = c/2 (exp(a1 (tr E)^2 + a2 E:E) - 1).
-//! Fung, Biomechanics: Mechanical Properties of Living Tissues, 2nd ed., 1993, section 7.7, for isotropy.
+//! After Fung, Biomechanics: Mechanical Properties of Living Tissues, 2nd ed., 1993, chapter 7, for isotropy.
 #[small_strain_moduli(shear = c * a2 / 2.0, lame_lambda = c * a1)]
 struct Parameters {
     /// Stiffness.

@@ -1,6 +1,6 @@
 //! Heart muscle, W = c (exp(b (I1bar - 3)) - 1) + a (exp(d (sqrt(I4bar) - 1)^2) - 1) + kappa/2 (J - 1)^2.
 //! Humphrey & Yin, On constitutive relations and finite deformations of passive cardiac tissue, Journal of Biomechanical
-//! Engineering 109, 1987.
+//! Engineering 109, 1987; incompressible there.
 #[domain(J > 0.0)]
 struct Parameters {
     /// Stiffness of the matrix.

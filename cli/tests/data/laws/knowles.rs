@@ -1,5 +1,6 @@
 //! Power law, W = mu/(2 b) ((1 + b/n (I1bar - 3))^n - 1) + kappa/2 (J - 1)^2.
-//! Knowles, The finite anti-plane shear field near the tip of a crack, International Journal of Fracture 13, 1977, eq. 2.26.
+//! Knowles, The finite anti-plane shear field near the tip of a crack for a class of incompressible elastic solids,
+//! International Journal of Fracture 13, 1977; incompressible there.
 #[domain(J > 0.0)]
 #[small_strain_moduli(shear = mu, bulk = kappa)]
 struct Parameters {

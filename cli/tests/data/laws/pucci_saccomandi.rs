@@ -1,5 +1,6 @@
 //! Gent's limit with a term in the second invariant, W = -mu jm/2 ln(1 - (I1bar - 3)/jm) + c2 ln(I2bar/3) + kappa/2 (J - 1)^2.
-//! Pucci & Saccomandi, A note on the Gent model for rubber-like materials, Rubber Chemistry and Technology 75, 2002.
+//! Pucci & Saccomandi, A note on the Gent model for rubber-like materials, Rubber Chemistry and Technology 75, 2002;
+//! incompressible there.
 #[domain(select(J > 0.0, jm - (I1bar - 3.0), J) > 0.0)]
 #[small_strain_moduli(shear = mu + 2.0 / 3.0 * c2, bulk = kappa)]
 struct Parameters {
