@@ -128,9 +128,10 @@ mod tests {
                 continue;
             }
             let material = Material::usual(&subject).expect("a material");
-            let single: Vec<f32> = material.constants(derivation).iter().map(|c| *c as f32).collect();
-            let double: Vec<f64> = single.iter().map(|c| f64::from(*c)).collect();
-            let exact: Vec<Exact> = double.iter().map(|c| Exact::from(*c)).collect();
+            let double = material.constants(derivation);
+            let single: Vec<f32> = double.iter().map(|c| *c as f32).collect();
+            // Constants that cancel at rest do so exactly: their roundings are among those that count.
+            let exact = material.exact_constants(derivation);
             let mut squares = vec![];
             for k in 0..24 {
                 let g = Random::new(&[5, k]).gradient(0.1, 0.1, 0).map(|x| x as f32);
@@ -152,7 +153,7 @@ mod tests {
             }
             // Roundings are less than a unit, by 1/sqrt(2) on average over the digits; functions may be off by two.
             let mean = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
-            assert!((0.25..2.0).contains(&mean), "{}: {mean} of what is expected", entry.info.name);
+            assert!((0.4..1.2).contains(&mean), "{}: {mean} of what is expected", entry.info.name);
         }
     }
 }
