@@ -192,6 +192,8 @@ fn unreadable(e: &DerivationError) -> String {
 /// # Errors
 /// A defect of the generator: an element or a text that it refuses itself.
 pub fn print(laws: &[GeneratedLaw]) -> Result<String, GenerateError> {
+    // All are checked, whichever kernels are made for.
+    element::declarations()?;
     let element = element::kernels(&element::tetrahedron_p1())?;
     let modules: Vec<TokenStream> = laws.iter().map(|g| rust::law_module(&g.law, &g.derivation, g.reviewed)).collect();
     let names: Vec<_> = laws.iter().map(|g| format_ident!("{}", g.law.name)).collect();

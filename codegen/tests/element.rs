@@ -1,42 +1,140 @@
 //! Elements: what a declaration must satisfy, and what the generated gather and contraction do.
 
-use tensormass_codegen::element::{ElementDeclaration, kernels, tetrahedron_p1};
+use tensormass_codegen::element::{ElementDeclaration, declarations, kernels, tetrahedron_p1};
 use tensormass_codegen::ir::{Input, Rational, ValidKernel};
 
 fn q(numerator: i128, denominator: i128) -> Rational {
     Rational::new(numerator, denominator)
 }
 
-/// Changes the declaration of the linear tetrahedron and compares the message.
-fn check(change: impl FnOnce(&mut ElementDeclaration), expected: &str) {
-    let mut element = tetrahedron_p1();
-    change(&mut element);
-    assert_eq!(kernels(&element).expect_err("refused").to_string(), expected);
+/// The text of a declaration.
+fn text(name: &str) -> String {
+    let path = format!("{}/elements/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    std::fs::read_to_string(path).expect("the element is declared")
+}
+
+/// A declaration with one place changed, and the message that refuses it.
+fn check(name: &str, old: &str, new: &str, expected: &str) {
+    let text = text(name);
+    assert!(text.contains(old), "{name} has no `{old}`");
+    let all = declarations().expect("accepted");
+    let changed = ElementDeclaration::parse(name, &text.replacen(old, new, 1));
+    let refused = changed.and_then(|element| element.check_faces(&all)).expect_err(expected).to_string();
+    assert_eq!(refused, format!("element `{name}`: {expected}"));
 }
 
 #[test]
 fn a_wrong_declaration_is_refused() {
-    let unity = "element `tetrahedron_p1`: its interpolation functions do not sum to 1";
-    check(|e| e.functions[0][0].0 = q(2, 1), unity);
-    check(|e| e.functions[1][0].0 = q(1, 2), unity);
-    check(|e| e.functions[3].push((q(1, 1), [1, 1, 0])), unity);
-    check(|e| drop(e.functions.pop()), unity);
-    let constant = "element `tetrahedron_p1`: only elements with constant gradients and one quadrature point are \
-                    supported by this version";
-    check(|e| e.quadrature.push(([q(1, 4); 3], q(0, 1))), constant);
-    // x y moved from one function to another: the sum is still one, the gradients vary.
-    let bubble = |e: &mut ElementDeclaration| {
-        e.functions[0].push((q(-1, 1), [1, 1, 0]));
-        e.functions[1].push((q(1, 1), [1, 1, 0]));
-    };
-    check(bubble, constant);
+    let [p1, p2, hexahedron] = ["tetrahedron_p1", "tetrahedron_p2", "hexahedron_s2"];
+    check(p1, "1 - x - y - z", "1 - x - y", "its interpolation functions do not sum to 1");
+    check(p1, "order = 1", "order = 2", "a polynomial of order 2 is not reproduced");
+    check(
+        p1,
+        "\"x\"",
+        "\"x^2\"",
+        "`x^2`: write sums and products of x, y, z and whole numbers, divided by whole numbers",
+    );
+    check(p1, "\"z\",\n", "", "it has 4 nodes and 3 interpolation functions");
+    check(p1, "\"1, 0, 0\"", "\"1, 0\"", "`1, 0` has 2 coordinates, the shape 3");
+    check(p1, "\"1, 0, 0\"", "\"2, 0, 0\"", "node 1 is outside the shape");
+    check(p1, "1 / 6", "1 / 5", "its quadrature is not exact for polynomials of degree 0");
+    check(p1, "degree = 1", "degree = 2", "its quadrature is not exact for polynomials of degree 2");
+    check(p1, "1 / 4, 1 / 4", "1 / 4, 1 / 1", "a quadrature point is outside the shape, or a weight is not positive");
+    check(
+        p1,
+        "tetrahedron\"",
+        "cone\"",
+        "there is no shape `cone`; the shapes are `segment`, `triangle`, `quadrangle`, `tetrahedron`, `hexahedron`, `prism`",
+    );
+    check(p1, "[0, 2, 1]", "[0, 1, 2]", "the normal of face 0 points inwards");
+    check(p1, "[0, 2, 1]", "[0, 2]", "face 0 does not name 3 nodes of the element");
+    check(p1, "triangle_p1", "triangle_p3", "face 0 is an element `triangle_p3`, which is not declared");
+    // Summed rows of the quadratic tetrahedron's mass are negative at its corners.
+    check(p2, "diagonal", "row_sum", "a node bears no or a negative lumped mass; declare `lumping = \"diagonal\"`");
+    check(p2, "7, 9, 8]\n\n", "7, 9, 9]\n\n", "its gmsh order does not name each of its 10 nodes once");
+    // One face stands twice.
+    check(p1, "[0, 1, 3]", "[1, 2, 3]", "its faces do not enclose it");
+    // Two mid-side nodes of a face change places.
+    check(
+        p2,
+        "[0, 2, 1, 6, 5, 4]",
+        "[0, 2, 1, 5, 6, 4]",
+        "on face 0 the function of node 0 is not that of `triangle_p2`",
+    );
+    // Two functions change places.
+    let (first, second) = ("\"4 * x * y\"", "\"4 * y * (1 - x - y - z)\"");
+    check(
+        p2,
+        &format!("{first},\n    {second}"),
+        &format!("{second},\n    {first}"),
+        "a polynomial of order 1 is not reproduced",
+    );
+    check(hexahedron, "degree = 5", "degree = 6", "its quadrature is not exact for polynomials of degree 6");
+}
+
+/// The Kronecker property is one of its own: a bubble moved between nodes reproduces what it did.
+#[test]
+fn functions_are_one_at_their_node_and_zero_at_others() {
+    let name = "quadrangle_s2";
+    let text = text(name).replacen("(1 - x * x) * (1 - y) / 2", "(1 - x * x) * (1 - y * y) / 2", 1);
+    let refused = ElementDeclaration::parse(name, &text).expect_err("refused").to_string();
+    assert_eq!(refused, format!("element `{name}`: its interpolation functions do not sum to 1"));
+}
+
+#[test]
+fn elements_that_kernels_are_not_made_for_are_refused() {
+    for element in declarations().expect("accepted") {
+        let constant = element.name == "tetrahedron_p1";
+        let expected = format!(
+            "element `{}`: only elements with constant gradients and one quadrature point are supported by this version",
+            element.name
+        );
+        match kernels(&element) {
+            Ok(_) => assert!(constant, "{}", element.name),
+            Err(error) => assert!(!constant && error.to_string() == expected, "{error}"),
+        }
+    }
+}
+
+/// What the checks of declarations prove by polynomials, once more by numbers, and what they take as given.
+#[test]
+fn declared_elements_are_what_the_literature_says() {
+    let all = declarations().expect("accepted");
+    let of = |name: &str| all.iter().find(|e| e.name == name).expect("declared");
+    // Nodes, order, quadrature points, and the lumped masses of a corner and of a mid-side node.
+    let known = [
+        ("segment_p1", 2, 1, 1, (q(1, 2), None)),
+        ("segment_p2", 3, 2, 2, (q(1, 6), Some(q(2, 3)))),
+        ("triangle_p1", 3, 1, 1, (q(1, 3), None)),
+        ("triangle_p2", 6, 2, 3, (q(1, 19), Some(q(16, 57)))),
+        ("quadrangle_q1", 4, 1, 4, (q(1, 4), None)),
+        ("quadrangle_s2", 8, 2, 9, (q(3, 76), Some(q(4, 19)))),
+        ("tetrahedron_p1", 4, 1, 1, (q(1, 4), None)),
+        ("tetrahedron_p2", 10, 2, 4, (q(1, 36), Some(q(4, 27)))),
+        ("hexahedron_q1", 8, 1, 8, (q(1, 8), None)),
+        ("hexahedron_s2", 20, 2, 27, (q(0, 1), None)),
+        ("prism_p1", 6, 1, 6, (q(1, 6), None)),
+    ];
+    assert_eq!(known.map(|k| k.0).len(), all.len(), "every element is here");
+    for (name, nodes, order, points, (corner, side)) in known {
+        let element = of(name);
+        let found = (element.nodes.len(), element.order, element.quadrature.points.len());
+        assert_eq!(found, (nodes, order, points), "{name}");
+        let whole: Rational = element.lumping.iter().sum();
+        assert_eq!(whole, q(1, 1), "{name}");
+        if corner != q(0, 1) {
+            assert_eq!(element.lumping[0], corner, "{name}: a corner");
+            assert_eq!(side.map(|_| *element.lumping.last().expect("a node")), side, "{name}: a side");
+        }
+        assert!(!element.docs.is_empty() && !element.source.is_empty(), "{name}");
+        assert_eq!(element.vtk.order.len(), nodes, "{name}");
+    }
 }
 
 #[test]
 fn the_declared_tetrahedron_is_linear() {
     let element = tetrahedron_p1();
-    let weight: Rational = element.quadrature.iter().map(|(_, w)| *w).sum();
-    assert_eq!(weight, q(1, 6), "the volume of the reference tetrahedron");
+    assert_eq!(element.quadrature.weights, [1.0 / 6.0], "the volume of the reference tetrahedron");
     let rows: Vec<[i128; 3]> =
         kernels(&element).expect("accepted").reference_gradients.iter().map(|r| r.map(|x| x.to_integer())).collect();
     assert_eq!(rows, [[-1, -1, -1], [1, 0, 0], [0, 1, 0], [0, 0, 1]]);

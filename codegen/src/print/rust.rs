@@ -74,7 +74,7 @@ fn damping(derivation: &Derivation) -> TokenStream {
 /// An element's module: its size, its kernels, and `more` items.
 pub fn element_module(element: &ElementKernels, more: &TokenStream) -> TokenStream {
     let module = format_ident!("{}", element.name);
-    let docs = doc_comment(element.docs);
+    let docs = doc_comment(&element.docs);
     let nodes = plain(element.nodes as usize);
     let rows = element.reference_gradients.iter().map(|row| {
         let row = row.map(float);

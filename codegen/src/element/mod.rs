@@ -5,37 +5,37 @@
 //! sum_j grad Lambda_j = 0: the gather subtracts the first node's displacement before it multiplies, which keeps the
 //! digits of a small strain in a large translation.
 
-use num_traits::{One, Zero};
+mod declaration;
+mod polynomial;
+mod shape;
+
+use num_traits::Zero;
+
+pub use declaration::{ElementDeclaration, Face, Numbering, Quadrature};
+pub use polynomial::Polynomial;
+pub use shape::{SHAPES, Shape};
 
 use crate::ir::{Builder, Input, InvalidKernel, KernelIr, Output, Rational, ValidKernel, ValueId};
 
-/// A polynomial in the reference coordinates: coefficient and exponents of each term.
-pub type Polynomial = Vec<(Rational, [u32; 3])>;
-
-/// An element, as data.
-#[derive(Debug, Clone)]
-pub struct ElementDeclaration {
-    /// Its name, a snake_case identifier.
-    pub name: &'static str,
-    /// What it is, for the reader.
-    pub docs: &'static str,
-    /// Interpolation functions Lambda_j, one a node.
-    pub functions: Vec<Polynomial>,
-    /// Quadrature points (reference coordinates) and weights; the weights sum to the reference volume.
-    pub quadrature: Vec<([Rational; 3], Rational)>,
-}
+/// Name and text of each file of `elements/`.
+const DECLARATIONS: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/elements.rs"));
 
 /// Why an element's declaration is refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ElementError {
-    /// The functions do not sum to one.
-    #[error("element `{0}`: its interpolation functions do not sum to 1")]
-    Unity(&'static str),
+    /// The declaration is none, or the element is not what it has to be.
+    #[error("element `{element}`: {reason}")]
+    Declaration {
+        /// The element.
+        element: String,
+        /// What is wrong.
+        reason: String,
+    },
     /// The gradients are not constant, or there are several quadrature points.
     #[error(
         "element `{0}`: only elements with constant gradients and one quadrature point are supported by this version"
     )]
-    NotConstant(&'static str),
+    NotConstant(String),
     /// A printed kernel breaks a rule: a defect of the generator.
     #[error(transparent)]
     Invalid(#[from] InvalidKernel),
@@ -45,9 +45,9 @@ pub enum ElementError {
 #[derive(Debug, Clone)]
 pub struct ElementKernels {
     /// The element's name.
-    pub name: &'static str,
+    pub name: String,
     /// What it is.
-    pub docs: &'static str,
+    pub docs: String,
     /// Number of nodes.
     pub nodes: u32,
     /// Nodal displacements and shape gradients -> G.
@@ -60,50 +60,24 @@ pub struct ElementKernels {
     pub reference_gradients: Vec<[Rational; 3]>,
 }
 
-/// The linear tetrahedron: Lambda_0 = 1 - x - y - z, Lambda_1 = x, Lambda_2 = y, Lambda_3 = z; one quadrature point.
+/// The declarations of this crate, in the order of their names.
+///
+/// # Errors
+/// [`ElementError::Declaration`]: the first that is wrong.
+pub fn declarations() -> Result<Vec<ElementDeclaration>, ElementError> {
+    let all = DECLARATIONS.iter().map(|(name, text)| ElementDeclaration::parse(name, text));
+    let all = all.collect::<Result<Vec<_>, _>>()?;
+    all.iter().try_for_each(|element| element.check_faces(&all))?;
+    Ok(all)
+}
+
+/// The linear tetrahedron.
+///
+/// # Panics
+/// Its declaration is wrong: a test of this crate reads it.
 pub fn tetrahedron_p1() -> ElementDeclaration {
-    let one = Rational::one();
-    let axis = |k: usize| {
-        let mut e = [0; 3];
-        e[k] = 1;
-        e
-    };
-    let quarter = Rational::new(1, 4);
-    ElementDeclaration {
-        name: "tetrahedron_p1",
-        docs: "The linear tetrahedron: constant gradients, one quadrature point (Faure et al. 2012, eqs. 2 to 6).",
-        functions: vec![
-            vec![(one, [0; 3]), (-one, axis(0)), (-one, axis(1)), (-one, axis(2))],
-            vec![(one, axis(0))],
-            vec![(one, axis(1))],
-            vec![(one, axis(2))],
-        ],
-        quadrature: vec![([quarter; 3], Rational::new(1, 6))],
-    }
-}
-
-fn derivative(p: &Polynomial, k: usize) -> Polynomial {
-    let mut terms = Vec::new();
-    for (c, e) in p {
-        if e[k] > 0 {
-            let mut lower = *e;
-            lower[k] -= 1;
-            terms.push((*c * Rational::from_integer(e[k].into()), lower));
-        }
-    }
-    terms
-}
-
-fn constant(p: &Polynomial) -> Option<Rational> {
-    p.iter().all(|(_, e)| *e == [0; 3]).then(|| p.iter().map(|(c, _)| *c).sum())
-}
-
-fn sums_to_one(functions: &[Polynomial]) -> bool {
-    let mut total = std::collections::BTreeMap::new();
-    for (c, e) in functions.iter().flatten() {
-        *total.entry(*e).or_insert_with(Rational::zero) += *c;
-    }
-    total.iter().all(|(e, c)| if *e == [0; 3] { c.is_one() } else { c.is_zero() })
+    let (name, text) = DECLARATIONS.iter().find(|(name, _)| *name == "tetrahedron_p1").expect("it is declared");
+    ElementDeclaration::parse(name, text).expect("its declaration is right")
 }
 
 /// Generates the kernels of an element.
@@ -111,24 +85,22 @@ fn sums_to_one(functions: &[Polynomial]) -> bool {
 /// # Errors
 /// See [`ElementError`].
 pub fn kernels(element: &ElementDeclaration) -> Result<ElementKernels, ElementError> {
-    if !sums_to_one(&element.functions) {
-        return Err(ElementError::Unity(element.name));
-    }
-    if element.quadrature.len() != 1 {
-        return Err(ElementError::NotConstant(element.name));
+    let refuse = || ElementError::NotConstant(element.name.clone());
+    if element.quadrature.points.len() != 1 || element.shape.dimension() != 3 {
+        return Err(refuse());
     }
     let mut reference_gradients = Vec::new();
     for f in &element.functions {
         let mut row = [Rational::zero(); 3];
         for (k, entry) in row.iter_mut().enumerate() {
-            *entry = constant(&derivative(f, k)).ok_or(ElementError::NotConstant(element.name))?;
+            *entry = f.derivative(k).as_constant().ok_or_else(refuse)?;
         }
         reference_gradients.push(row);
     }
     let n = element.functions.len() as u32;
     Ok(ElementKernels {
-        name: element.name,
-        docs: element.docs,
+        name: element.name.clone(),
+        docs: element.docs.clone(),
         nodes: n,
         gradient: gradient(n).validate()?,
         contract: contract(n).validate()?,
