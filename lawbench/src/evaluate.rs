@@ -90,4 +90,33 @@ mod tests {
             assert_eq!(textbook(&derivation, "force", &inputs).value, [2.0; 9]);
         }
     }
+
+    /// Forms that are split at rest serve there, and neither where a body is compressed to almost nothing nor where it is
+    /// blown up to eight times its volume.
+    #[test]
+    fn split_forms_end_where_they_would_lose_digits() {
+        let mut split = 0;
+        for entry in tensormass_kernels::laws() {
+            let derivation = Derivation::from_text(entry.source.derivation).expect("a derivation");
+            let subject = crate::subject::Subject::of_build(entry);
+            let constants = crate::material::Material::usual(&subject).expect("a material").constants(&derivation);
+            for kernel in &derivation.kernels {
+                let Some(at) = kernel.ir().outputs.iter().position(|(role, _)| *role == Output::NearRest) else {
+                    continue;
+                };
+                split += 1;
+                for (stretch, holds) in [(1.0, true), (1.2, true), (0.7, false), (0.1, false), (2.0, false)] {
+                    let g: [f64; 9] = std::array::from_fn(|k| if k % 4 == 0 { stretch - 1.0 } else { 0.0 });
+                    let inputs = [
+                        (Input::Constants, constants.as_slice()),
+                        (Input::DisplacementGradient, &g[..]),
+                        (Input::GradientIncrement, &g[..]),
+                    ];
+                    let margin = kernel.interpret(&inputs).expect("the inputs of a point kernel")[at][0];
+                    assert_eq!(margin > 0.0, holds, "{} {} at {stretch}", entry.info.name, kernel.ir().name);
+                }
+            }
+        }
+        assert!(split > 0, "no kernel is split at rest");
+    }
 }
