@@ -18,6 +18,8 @@ pub struct Differential<'a> {
     /// Quantities that differ from others by constants: their differential is the other's.
     same: BTreeMap<Symbol, Symbol>,
     known: HashMap<Symbol, Expr>,
+    /// The partial derivatives that are not polynomials, if they are to be stages of their own.
+    slopes: Option<Vec<Symbol>>,
 }
 
 impl<'a> Differential<'a> {
@@ -29,12 +31,22 @@ impl<'a> Differential<'a> {
         seeds: BTreeMap<Symbol, Expr>,
         stop: Vec<Symbol>,
     ) -> Self {
-        Self { cas, quantities, prefix, seeds, stop, same: BTreeMap::new(), known: HashMap::new() }
+        Self { cas, quantities, prefix, seeds, stop, same: BTreeMap::new(), known: HashMap::new(), slopes: None }
     }
 
     /// Gives each first quantity the differential of its second.
     pub fn with_same(self, same: BTreeMap<Symbol, Symbol>) -> Self {
         Self { same, ..self }
+    }
+
+    /// Makes every partial derivative that is not a polynomial a stage of its own: a slope.
+    pub fn with_slopes(self) -> Self {
+        Self { slopes: Some(vec![]), ..self }
+    }
+
+    /// The slopes that were met.
+    pub fn into_slopes(self) -> Vec<Symbol> {
+        self.slopes.unwrap_or_default()
     }
 
     /// The differential of an expression.
@@ -43,7 +55,14 @@ impl<'a> Differential<'a> {
         for s in e.symbols() {
             let ds = self.symbol(s)?;
             if !ds.is_zero() {
-                let partial = self.cas.derivative(e, s)?;
+                let mut partial = self.cas.derivative(e, s)?;
+                if let Some(slopes) = &mut self.slopes
+                    && !self.quantities.is_polynomial(&partial)
+                {
+                    let slope = self.quantities.stage("slope", partial);
+                    slopes.push(slope);
+                    partial = slope.into();
+                }
                 terms.push(partial * ds);
             }
         }

@@ -81,10 +81,6 @@ struct Session {
     far_margin: Option<Expr>,
     /// The comparisons of the law's selections.
     conditions: Vec<(Expr, Expr)>,
-    /// Whether a broken power of J multiplies what depends on the strain.
-    isochoric: bool,
-    /// Whether the derivative of the energy by tr A depends on the strain.
-    curved: bool,
     /// The symbols of the parameters' components, parameter by parameter.
     parameters: Vec<Vec<Symbol>>,
 }
@@ -107,7 +103,6 @@ impl Session {
         let others = others.iter().map(|e| reader.scalar(e)).collect::<Result<Vec<Expr>, _>>()?;
         let ranges = reader.ranges(law);
         let conditions = std::mem::take(&mut reader.conditions);
-        let isochoric = reader.isochoric;
         let parameters = reader.parameters.clone();
         reader.far_from_rest();
         let far_energy = reader.scalar(&law.energy)?;
@@ -130,8 +125,6 @@ impl Session {
             far_energy,
             far_margin,
             conditions,
-            isochoric,
-            curved: false,
             parameters,
         };
         Ok((session, others))
@@ -186,30 +179,23 @@ impl Session {
             None => point.push(self.lower("force", &[G], with_margin(Output::Stress, stress.to_vec(), &margin))),
         }
         let near_increment = match &near_stress {
-            Some(near) if self.isochoric => Some((self.near_increment(near, &dgradient)?, near.holds.clone())),
-            _ => None,
+            Some(near) => Some((self.near_increment(near, &dgradient)?, near.tangent_holds.clone())),
+            None => None,
         };
         // Of every selection that the tangents have made.
         let accurate = self.accurate()?;
-        let outputs = vec![(Output::StressIncrement, increment)];
         match near_increment {
-            Some(((increment, split), holds)) => {
-                let near = vec![(Output::StressIncrement, increment), (Output::NearRest, vec![holds])];
+            Some(((near, split), holds)) => {
+                let near = vec![(Output::StressIncrement, near), (Output::NearRest, vec![holds])];
                 let instead = [accurate.as_slice(), &split].concat();
                 point.push(self.lower_with("dforce", &[G, GradientIncrement], near, &instead));
-                let far_increment = vec![(Output::StressIncrement, self.of_deformation(&outputs[0].1)?)];
-                point.push(self.lower("dforce_far", &[G, GradientIncrement], far_increment));
+                let far = vec![(Output::StressIncrement, self.of_deformation(&increment)?)];
+                point.push(self.lower("dforce_far", &[G, GradientIncrement], far));
             }
-            None => match &near_stress {
-                // 3 + tr A in it would lose tr C.
-                Some(near) if self.curved => {
-                    let far_increment = vec![(Output::StressIncrement, self.of_deformation(&outputs[0].1)?)];
-                    let near = [outputs, vec![(Output::NearRest, vec![near.holds.clone()])]].concat();
-                    point.push(self.lower_with("dforce", &[G, GradientIncrement], near, &accurate));
-                    point.push(self.lower("dforce_far", &[G, GradientIncrement], far_increment));
-                }
-                _ => point.push(self.lower_with("dforce", &[G, GradientIncrement], outputs, &accurate)),
-            },
+            None => {
+                let outputs = vec![(Output::StressIncrement, increment)];
+                point.push(self.lower_with("dforce", &[G, GradientIncrement], outputs, &accurate));
+            }
         }
         point.push(self.lower_with("diagonal", &[G, NodeGradient], vec![(Output::Diagonal, diagonal)], &accurate));
         match near_stress {
@@ -307,7 +293,6 @@ impl Session {
                 self.quantities.stage(name, w).into()
             };
             if !w.is_zero() {
-                self.curved |= invariant == Invariant::Trace(Invariant::OF_C) && !self.quantities.is_constant_expr(&w);
                 weights.push((invariant, q, w));
             }
         }

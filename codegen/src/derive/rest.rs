@@ -16,7 +16,9 @@ const GREATEST_STRAIN: (i128, i128) = (16, 1);
 const GREATEST_STRETCH: (i128, i128) = (4, 1);
 
 /// Over G without a bound on the strain: up to J = 4, from where on what is split off is the lesser part.
-const GREATEST_VOLUME: i128 = 4;
+const GREATEST_VOLUME: (i128, i128) = (4, 1);
+/// Tangents, whose second derivatives by J are split too: with J^-n of them little is left soon.
+const GREATEST_TANGENT: (i128, i128) = (5, 4);
 
 /// Pairs of a quantity and what is computed for it.
 pub type StandIns = Vec<(Symbol, Symbol)>;
@@ -39,6 +41,8 @@ pub struct NearStress {
     pub cauchy: Vec<Expr>,
     /// Positive where they hold.
     pub holds: Expr,
+    /// Positive where their differential does.
+    pub tangent_holds: Expr,
     /// The quantities that were split: each with the symbols of its change and of its value.
     split: Vec<(Symbol, Option<Symbol>, Option<Symbol>)>,
 }
@@ -52,7 +56,7 @@ impl Session {
         let splitter = Splitter::of_energy(&mut self.cas, &mut self.quantities, &mut self.rest, "energy", leaves);
         let (near, at_rest) = splitter.energy(&energy)?;
         let Some(value) = near else { return Ok((None, at_rest)) };
-        let holds = self.near_rest(jacobian.map(Expr::from), true)?;
+        let holds = self.near_rest(jacobian.map(Expr::from), true, None)?;
         Ok((Some(NearEnergy { value, holds }), at_rest))
     }
 
@@ -148,14 +152,17 @@ impl Session {
         let stress: [Expr; 9] = near.try_into().expect("nine components");
         let cauchy = self.cauchy_of(&stress, &j, &f);
         let bounded = !uses_j || self.strain.has_stretch_sums();
-        let holds = self.near_rest(uses_j.then_some(j), bounded)?;
-        Ok(Some(NearStress { stress, margin, cauchy, holds, split }))
+        let j = uses_j.then_some(j);
+        let holds = self.near_rest(j.clone(), bounded, (!bounded).then_some(GREATEST_VOLUME))?;
+        let tangent_holds = self.near_rest(j, bounded, Some(GREATEST_TANGENT))?;
+        Ok(Some(NearStress { stress, margin, cauchy, holds, tangent_holds, split }))
     }
 
     /// The differential of the stress from its form near rest, and pairs of quantities and what to compute for them.
     ///
-    /// Nothing in a textbook tangent cancels but the large second derivatives by J of isochoric energies, whose parts
-    /// that are the same in every direction are added here before they are multiplied by anything that is rounded.
+    /// What cancels in a textbook tangent are its parts that are the same in every direction, the more, the stiffer the body
+    /// is against changes of volume: they are added here before they are multiplied by anything that is rounded, and the
+    /// second derivatives of W in them are split at rest.
     pub(super) fn near_increment(
         &mut self,
         near: &NearStress,
@@ -196,9 +203,34 @@ impl Session {
         }
         let seeds = self.strain.gradient().iter().copied().zip(dgradient.iter().map(|&s| s.into())).collect();
         let differential = Differential::new(&mut self.cas, &mut self.quantities, "d", seeds, vec![]);
-        let mut differential = differential.with_same(same);
+        let mut differential = differential.with_same(same).with_slopes();
         let increment: Result<Vec<Expr>, _> = expressions.iter().map(|p| differential.of(p)).collect();
-        Ok((increment?, instead))
+        let increment = increment?;
+        let slopes = differential.into_slopes();
+        instead.extend(self.split_slopes(&slopes)?);
+        Ok((increment, instead))
+    }
+
+    /// Slopes that are not polynomials, each with its value at rest and the change since: at rest, where parts of a tangent
+    /// cancel most, they are the exact constants.
+    fn split_slopes(&mut self, slopes: &[Symbol]) -> Result<StandIns, DeriveError> {
+        let second = self.near_second()?;
+        let sums = self.strain.near_stretch_sums(&mut self.quantities);
+        let mut splitter = Splitter::first(&mut self.cas, &mut self.quantities, &mut self.rest, "dforce");
+        for s in sums {
+            splitter.give(s.sum, Split::given(Expr::int(3), s.change));
+        }
+        if let Some((second, _, _, change)) = second {
+            splitter.give(second, Split::given(Expr::int(3), change));
+        }
+        let mut pairs = vec![];
+        for &slope in slopes {
+            // What no rule splits is computed as it stands: nothing in it cancels.
+            if let Ok(Split { value: Expr::Symbol(value), .. }) = splitter.split(&slope.into()) {
+                pairs.push((slope, value));
+            }
+        }
+        Ok(pairs)
     }
 
     /// A sum with its multiples of changes gathered into one quantity, so that nothing is factored out of them.
@@ -269,9 +301,14 @@ impl Session {
         Ok(pairs)
     }
 
-    /// Positive near rest: where J is between 1/2 and 4, and, if the strain is bounded too, where E:E <= 4. Where there is no
-    /// J, tr C > 2 stands for a body that is not compressed to almost nothing.
-    fn near_rest(&mut self, jacobian: Option<Expr>, bounded: bool) -> Result<Expr, DeriveError> {
+    /// Positive near rest: where J is above 1/2 and below the greatest, if one is given, and, if the strain is bounded too,
+    /// where E:E <= 4. Where there is no J, tr C > 2 stands for a body that is not compressed to almost nothing.
+    fn near_rest(
+        &mut self,
+        jacobian: Option<Expr>,
+        bounded: bool,
+        greatest: Option<(i128, i128)>,
+    ) -> Result<Expr, DeriveError> {
         let (cas, quantities) = (&mut self.cas, &mut self.quantities);
         let small = if bounded {
             let square = self.strain.invariant(cas, quantities, Invariant::Ddot(Base::A, Base::A))?;
@@ -280,24 +317,21 @@ impl Session {
         } else {
             None
         };
-        // A product serves where both factors cannot be negative.
-        Ok(match (jacobian, small) {
-            (Some(j), None) => {
-                let (above, below) = (j.clone() - Expr::ratio(1, 2), Expr::int(GREATEST_VOLUME) - j);
-                above * below
-            }
-            (Some(j), Some(small)) => {
-                let above = j - Expr::ratio(1, 2);
-                let (left, right) = (small.clone(), above.clone());
-                let value = Value::Select { left, right, then: above, otherwise: small };
-                quantities.add("near_rest", Kind::Stage { value, partials: None }).into()
-            }
+        let Some(j) = jacobian else {
             // tr A > -1 wherever A:A >= 16: no eigenvalue is below -1.
-            (None, small) => {
-                let trace = self.strain.invariant(cas, quantities, Invariant::Trace(Base::A))?;
-                let above = Expr::int(1) + trace.into();
-                small.map_or(above.clone(), |small| small * above)
-            }
-        })
+            let trace = self.strain.invariant(cas, quantities, Invariant::Trace(Base::A))?;
+            let above = Expr::int(1) + trace.into();
+            return Ok(small.map_or(above.clone(), |small| small * above));
+        };
+        // A product serves where both factors cannot be negative.
+        let above = j.clone() - Expr::ratio(1, 2);
+        let volume = match greatest {
+            Some((n, d)) => above * (Expr::ratio(n, d) - j),
+            None => above,
+        };
+        let Some(small) = small else { return Ok(volume) };
+        let (left, right) = (small.clone(), volume.clone());
+        let value = Value::Select { left, right, then: volume, otherwise: small };
+        Ok(quantities.add("near_rest", Kind::Stage { value, partials: None }).into())
     }
 }
