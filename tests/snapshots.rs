@@ -79,7 +79,7 @@ fn each_reviewed_law() {
 #[test]
 fn element_module() {
     let element = element();
-    check("element_tetrahedron_p1", &rust::format(rust::element_module(&element, &Default::default())).expect("Rust"));
+    check("element_tetrahedron_p1", &rust::format(rust::element_module(&element)).expect("Rust"));
     let ir = [&element.gradient, &element.contract, &element.node_gradients].map(|k| k.ir().to_text());
     check("element_tetrahedron_p1_ir", &ir.join("\n"));
 }

@@ -1,6 +1,6 @@
 //! The generated WGSL: every law and pass is valid, within every device's limits, and binds what its `Shader` says.
 
-use tensormass_kernels::generated::tetrahedron_p1::{NODE_PRODUCT, NODE_SUM};
+use tensormass_kernels::generated::{NODE_PRODUCT, NODE_SUM};
 use tensormass_kernels::laws;
 use tensormass_kernels::shader::Shader;
 use tensormass_testing::codegen::print::wgsl::is_free;

@@ -51,7 +51,10 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
     for law in &plan.laws {
         let unreviewed = if law.info.reviewed { "" } else { " (unreviewed)" };
         let constants = if law.per_element { "one set of constants an element" } else { "one set of constants" };
-        out += &format!("law {}{unreviewed}: {} elements, {constants}\n", law.info.name, law.elements);
+        out += &format!(
+            "law {}{unreviewed}: {} elements {}, {constants}\n",
+            law.info.name, law.elements, law.element.name
+        );
         let rows: Vec<Vec<String>> = law
             .kernels
             .iter()

@@ -8,7 +8,7 @@ use tensormass_lawbench::check::{Verdict, check};
 use tensormass_lawbench::extremes::{Options, extremes};
 use tensormass_lawbench::subject::Subject;
 
-/// Laws that spend up to twice the bounds of the gate: in the textbook form of their stress and of their tangent at rest,
+/// Laws that spend up to three times the bounds of the gate: in the textbook form of their stress and of their tangent at rest,
 /// numbers up to ten times the sum cancel (I2/I3 is tr C^-1, which no part of the one knows).
 const BEYOND: [&str; 2] = ["blatz_ko", "veronda_westmann"];
 

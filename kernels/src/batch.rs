@@ -4,18 +4,10 @@
 //! nodes into a slot of its own; who owns the nodes sums the slots. A law whose domain an element has left reports the
 //! element's index instead of a NaN.
 
+use crate::element::RestPoint;
 use crate::generated::tetrahedron_p1::{NODES, contract, gradient, node_gradients};
 use crate::law::Law;
 use crate::real::Real;
-
-/// Rest data of one linear tetrahedron.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RestElement<R> {
-    /// Gradients of the interpolation functions of nodes 1, 2, 3 (1/m).
-    pub shape_gradients: [R; 9],
-    /// Rest volume (m^3).
-    pub volume: R,
-}
 
 /// Elements of one law, and their material.
 #[derive(Debug, Clone, Copy)]
@@ -23,7 +15,7 @@ pub struct Batch<'a, R> {
     /// Node indices of each element, into the displacement array.
     pub nodes: &'a [[u32; NODES]],
     /// Rest data of each element.
-    pub rest: &'a [RestElement<R>],
+    pub rest: &'a [RestPoint<R>],
     /// The law's constants: of the one material, or one set after the other, an element each.
     pub constants: &'a [R],
     /// Constants between one element's set and the next: 0 where all elements share one.
@@ -65,13 +57,13 @@ pub type CauchyKernel<R> = fn(&Batch<R>, &[[R; 3]], &mut [[R; 9]]);
 pub(crate) fn gather<R: Real>(batch: &Batch<R>, e: usize, u: &[[R; 3]]) -> [R; 9] {
     let [a, b, c, d] = batch.nodes[e].map(|n| u[n as usize]);
     let nodal = [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2], d[0], d[1], d[2]];
-    gradient(&nodal, &batch.rest[e].shape_gradients)
+    gradient(&nodal, &batch.rest[e].inverse_jacobian)
 }
 
 #[inline(always)]
 pub(crate) fn scatter<R: Real>(batch: &Batch<R>, e: usize, stress: &[R; 9], slots: &mut [[R; 3]; NODES]) {
     let rest = &batch.rest[e];
-    let f = contract(stress, &rest.shape_gradients, rest.volume);
+    let f = contract(stress, &rest.inverse_jacobian, rest.weight);
     for (node, slot) in slots.iter_mut().enumerate() {
         *slot = [f[3 * node], f[3 * node + 1], f[3 * node + 2]];
     }
@@ -83,7 +75,7 @@ pub fn energy<L: Law, R: Real>(batch: &Batch<R>, u: &[[R; 3]], out: &mut [R]) ->
     for (e, out) in out.iter_mut().enumerate() {
         let g = gather(batch, e, u);
         let (w, margin) = L::energy(batch.constants(e), &g);
-        *out = w * batch.rest[e].volume;
+        *out = w * batch.rest[e].weight;
         if !margin.is_positive() && outside.is_none() {
             outside = Some(e);
         }
@@ -119,10 +111,10 @@ pub fn diagonal<L: Law, R: Real>(batch: &Batch<R>, u: &[[R; 3]], out: &mut [[[R;
     for (e, slots) in out.iter_mut().enumerate() {
         let g = gather(batch, e, u);
         let rest = &batch.rest[e];
-        let gradients = node_gradients(&rest.shape_gradients);
+        let gradients = node_gradients(&rest.inverse_jacobian);
         for (node, slot) in slots.iter_mut().enumerate() {
             let n = [gradients[3 * node], gradients[3 * node + 1], gradients[3 * node + 2]];
-            *slot = L::diagonal(batch.constants(e), &g, &n).map(|d| d * rest.volume);
+            *slot = L::diagonal(batch.constants(e), &g, &n).map(|d| d * rest.weight);
         }
     }
     None

@@ -6,6 +6,7 @@
 use crate::batch::{Batch, gather, scatter};
 use crate::generated::tetrahedron_p1::{NODES, node_gradients};
 use crate::law::Law;
+use crate::point::DampingPointKernels;
 use crate::real::Real;
 use crate::shader::DampingShaders;
 
@@ -75,6 +76,10 @@ pub struct DampingEntry {
     pub f32: fn() -> DampingKernels<f32>,
     /// Batched kernels in double precision.
     pub f64: fn() -> DampingKernels<f64>,
+    /// Kernels at quadrature points in single precision.
+    pub point_f32: fn() -> DampingPointKernels<f32>,
+    /// Kernels at quadrature points in double precision.
+    pub point_f64: fn() -> DampingPointKernels<f64>,
     /// The element passes as WGSL, in single precision.
     pub shaders: &'static DampingShaders,
 }
@@ -82,7 +87,9 @@ pub struct DampingEntry {
 impl DampingEntry {
     /// The damping of a law.
     pub const fn new<L: Dissipative>(linear: bool, shaders: &'static DampingShaders) -> Self {
-        Self { linear, f32: DampingKernels::<f32>::of::<L>, f64: DampingKernels::<f64>::of::<L>, shaders }
+        let (f32, f64) = (DampingKernels::<f32>::of::<L>, DampingKernels::<f64>::of::<L>);
+        let (point_f32, point_f64) = (DampingPointKernels::<f32>::of::<L>, DampingPointKernels::<f64>::of::<L>);
+        Self { linear, f32, f64, point_f32, point_f64, shaders }
     }
 }
 
@@ -90,7 +97,7 @@ impl DampingEntry {
 pub fn dissipation<L: Dissipative, R: Real>(batch: &Batch<R>, u: &[[R; 3]], v: &[[R; 3]], out: &mut [R]) {
     for (e, out) in out.iter_mut().enumerate() {
         let (g, rate) = (gather(batch, e, u), gather(batch, e, v));
-        *out = L::dissipation(batch.constants(e), &g, &rate) * batch.rest[e].volume;
+        *out = L::dissipation(batch.constants(e), &g, &rate) * batch.rest[e].weight;
     }
 }
 
@@ -121,10 +128,10 @@ pub fn diagonal<L: Dissipative, R: Real>(batch: &Batch<R>, u: &[[R; 3]], v: &[[R
     for (e, slots) in out.iter_mut().enumerate() {
         let (g, rate) = (gather(batch, e, u), gather(batch, e, v));
         let rest = &batch.rest[e];
-        let gradients = node_gradients(&rest.shape_gradients);
+        let gradients = node_gradients(&rest.inverse_jacobian);
         for (node, slot) in slots.iter_mut().enumerate() {
             let n = [gradients[3 * node], gradients[3 * node + 1], gradients[3 * node + 2]];
-            *slot = L::damping_diagonal(batch.constants(e), &g, &rate, &n).map(|d| d * rest.volume);
+            *slot = L::damping_diagonal(batch.constants(e), &g, &rate, &n).map(|d| d * rest.weight);
         }
     }
 }

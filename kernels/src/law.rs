@@ -2,6 +2,7 @@
 
 use crate::batch;
 use crate::damping::{DampingEntry, Dissipative};
+use crate::point::PointKernels;
 use crate::real::Real;
 use crate::shader::{DampingShaders, LawShaders};
 
@@ -188,6 +189,10 @@ pub struct LawEntry {
     pub f32: fn() -> BatchKernels<f32>,
     /// Batched kernels in double precision.
     pub f64: fn() -> BatchKernels<f64>,
+    /// Kernels at quadrature points in single precision.
+    pub point_f32: fn() -> PointKernels<f32>,
+    /// Kernels at quadrature points in double precision.
+    pub point_f64: fn() -> PointKernels<f64>,
     /// The element passes as WGSL, in single precision.
     pub shaders: &'static LawShaders,
     /// Its damping, if it has a dissipation.
@@ -198,7 +203,8 @@ impl LawEntry {
     /// The entry of a law.
     pub const fn new<L: Law>(info: &'static LawInfo, source: &'static LawSource, shaders: &'static LawShaders) -> Self {
         let (f32, f64) = (BatchKernels::<f32>::of::<L>, BatchKernels::<f64>::of::<L>);
-        Self { info, source, material: L::material, f32, f64, shaders, damping: None }
+        let (point_f32, point_f64) = (PointKernels::<f32>::of::<L>, PointKernels::<f64>::of::<L>);
+        Self { info, source, material: L::material, f32, f64, point_f32, point_f64, shaders, damping: None }
     }
 
     /// The entry with the law's damping; `linear` says whether its differential does not depend on the rate.

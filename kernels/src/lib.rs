@@ -2,18 +2,24 @@
 //!
 //! Generated code implements [`Law`] for any [`Real`]: strain energy density W, first Piola-Kirchhoff stress
 //! P = dW/dG, its differential dP in a direction dG, the diagonal of the tangent, and the Cauchy stress. The loops in
-//! [`batch`] compose a law with the linear tetrahedron into nodal forces. [`laws`] lists what this build has.
+//! [`batch`] compose a law with the linear tetrahedron into nodal forces, [`composed`] with any element. [`laws`] and
+//! [`elements`] list what this build has.
 
 // Generated text names this crate as any other crate would.
 extern crate self as tensormass_kernels;
 
 pub mod batch;
+pub mod composed;
 pub mod damping;
+pub mod element;
 mod law;
+pub mod point;
 mod real;
 pub mod shader;
 
+pub use composed::{Composed, ComposedBatch};
 pub use damping::{DampingEntry, DampingKernels, Dissipative};
+pub use element::{Element, ElementEntry, ElementInfo, Face, Numbering, ReferencePoint, RestPoint};
 pub use law::{Acceptance, BatchKernels, Law, LawEntry, LawInfo, LawSource, Operations, ParameterInfo, Structure};
 pub use real::Real;
 // Generated text computes constants in it.
@@ -41,4 +47,22 @@ pub fn laws() -> &'static [LawEntry] {
 /// The law of this name.
 pub fn law(name: &str) -> Option<&'static LawEntry> {
     laws().iter().find(|l| l.info.name == name)
+}
+
+/// Every element of this build, by name.
+pub fn elements() -> &'static [ElementEntry] {
+    generated::ELEMENTS
+}
+
+/// The element of this name.
+pub fn element(name: &str) -> Option<&'static ElementEntry> {
+    elements().iter().find(|e| e.info.name == name)
+}
+
+/// The linear tetrahedron, which the fused kernels of [`batch`] compute.
+///
+/// # Panics
+/// Never: the generator prints those kernels from its declaration.
+pub fn linear_tetrahedron() -> &'static ElementEntry {
+    elements().iter().find(|e| e.info.is_linear_simplex).expect("the fused kernels are of a declared element")
 }

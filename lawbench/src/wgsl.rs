@@ -96,7 +96,7 @@ mod gpu {
 
     use tensormass_codegen::element::{kernels, tetrahedron_p1};
     use tensormass_codegen::print::wgsl;
-    use tensormass_kernels::batch::RestElement;
+    use tensormass_kernels::RestPoint;
     use tensormass_kernels::shader::{Binding, LawShaders, Shader};
     use tensormass_kernels::{LawEntry, law, laws};
     use tensormass_runtime::backend::{Backend, ForceField};
@@ -160,13 +160,16 @@ mod gpu {
         let unit = |k: usize| if k.is_multiple_of(4) { 1.0 } else { 0.0 };
         let batch = LawBatch {
             law,
+            element: tensormass_kernels::linear_tetrahedron(),
             elements: (0..count as u32).collect(),
             constants: points.iter().flat_map(|p| p.constants.iter().copied().map(f64::from)).collect(),
             per_element: true,
         };
         Body {
             elements: (0..count as u32).map(|e| [0, 1, 2, 3].map(|k| 4 * e + k)).collect(),
-            rest: vec![RestElement { shape_gradients: std::array::from_fn(unit), volume: 1.0 }; count],
+            rest: (0..count)
+                .map(|_| [RestPoint { inverse_jacobian: std::array::from_fn(unit), weight: 1.0 }])
+                .collect(),
             batches: vec![batch],
             masses: vec![1.0; 4 * count],
             element_masses: vec![1.0; count],

@@ -2,16 +2,80 @@
 //!
 //! Everything here is in the units of [`crate::scale::Scale`] and in f64; a backend rounds it to its own precision.
 
-use tensormass_kernels::LawEntry;
-use tensormass_kernels::batch::RestElement;
+use std::ops::Index;
+
+use tensormass_kernels::{ElementEntry, LawEntry, RestPoint};
 
 use crate::history::History;
 
-/// The elements of one law.
+/// Rows of any lengths, one after the other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rows<T> {
+    ends: Vec<u32>,
+    values: Vec<T>,
+}
+
+impl<T> Default for Rows<T> {
+    fn default() -> Self {
+        Self { ends: vec![], values: vec![] }
+    }
+}
+
+impl<T> Rows<T> {
+    /// Adds a row.
+    ///
+    /// # Panics
+    /// There are more values than a `u32` can count: a mesh has not so many.
+    pub fn push(&mut self, row: impl IntoIterator<Item = T>) {
+        self.values.extend(row);
+        self.ends.push(u32::try_from(self.values.len()).expect("a mesh numbers its slots in u32"));
+    }
+
+    /// How many rows there are.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    /// The rows in order.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = &[T]> {
+        (0..self.len()).map(|row| &self[row])
+    }
+
+    /// All values, row after row.
+    pub fn values(&self) -> &[T] {
+        &self.values
+    }
+}
+
+impl<T, I: IntoIterator<Item = T>> FromIterator<I> for Rows<T> {
+    fn from_iter<A: IntoIterator<Item = I>>(rows: A) -> Self {
+        let mut all = Self::default();
+        rows.into_iter().for_each(|row| all.push(row));
+        all
+    }
+}
+
+impl<T> Index<usize> for Rows<T> {
+    type Output = [T];
+
+    fn index(&self, row: usize) -> &[T] {
+        let start = row.checked_sub(1).map_or(0, |before| self.ends[before]) as usize;
+        &self.values[start..self.ends[row] as usize]
+    }
+}
+
+/// The elements of one law and kind.
 #[derive(Debug, Clone)]
 pub struct LawBatch {
     /// The law.
     pub law: &'static LawEntry,
+    /// The kind of element.
+    pub element: &'static ElementEntry,
     /// The mesh's number of each element, ascending.
     pub elements: Vec<u32>,
     /// The law's constants: one set, or one set an element.
@@ -44,10 +108,10 @@ pub struct Load {
 #[derive(Debug, Clone)]
 pub struct Body {
     /// Nodes of each element.
-    pub elements: Vec<[u32; 4]>,
-    /// Rest data of each element.
-    pub rest: Vec<RestElement<f64>>,
-    /// Elements by law; every element is in exactly one batch.
+    pub elements: Rows<u32>,
+    /// The quadrature points of each element.
+    pub rest: Rows<RestPoint<f64>>,
+    /// Elements by law and kind; every element is in exactly one batch.
     pub batches: Vec<LawBatch>,
     /// Lumped mass of each node.
     pub masses: Vec<f64>,
@@ -91,12 +155,12 @@ impl Body {
     }
 }
 
-/// Lumped masses: an element gives a quarter of its mass to each of its nodes.
-pub fn lump(nodes: usize, elements: &[[u32; 4]], element_masses: &[f64]) -> Vec<f64> {
+/// Lumped masses: an element of mass m gives each of its nodes the part of it that its kind declares.
+pub fn lump<'a>(nodes: usize, elements: impl Iterator<Item = (&'a ElementEntry, &'a [u32], f64)>) -> Vec<f64> {
     let mut masses = vec![0.0; nodes];
-    for (nodes, m) in elements.iter().zip(element_masses) {
-        for &n in nodes {
-            masses[n as usize] += m / 4.0;
+    for (kind, nodes, mass) in elements {
+        for (n, part) in nodes.iter().zip(kind.info.lumping) {
+            masses[*n as usize] += mass * part;
         }
     }
     masses

@@ -2,8 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::mesh::TetMesh;
-use crate::output::{Field as Array, FieldValues, OutputError, PvdWriter, create_folder, remove_file, write_vtu};
+use crate::mesh::Mesh;
+use crate::output::{
+    Cells, Field as Array, FieldValues, OutputError, PvdWriter, create_folder, remove_file, write_vtu,
+};
 use crate::probe::{Needs, current_volume, of_stress};
 use crate::scene::{Field, StressComponent};
 
@@ -25,7 +27,7 @@ pub struct Frames {
     folder: PathBuf,
     index: PvdWriter,
     fields: Vec<Field>,
-    tets: Vec<[u32; 4]>,
+    cells: Cells,
     count: u32,
 }
 
@@ -34,7 +36,7 @@ impl Frames {
     ///
     /// # Errors
     /// The folder cannot be written.
-    pub fn create(out: &Path, mesh: &TetMesh, fields: &[Field]) -> Result<Self, OutputError> {
+    pub fn create(out: &Path, mesh: &Mesh, fields: &[Field]) -> Result<Self, OutputError> {
         let folder = out.join("frames");
         create_folder(&folder)?;
         // A longer earlier run would leave its last frames beside the new ones.
@@ -46,8 +48,8 @@ impl Frames {
             remove_file(&stale)?;
         }
         let index = PvdWriter::create(&out.join("frames.pvd"))?;
-        let tets = mesh.tets().iter().map(|t| t.map(|n| n.0)).collect();
-        Ok(Self { folder: out.to_path_buf(), index, fields: fields.to_vec(), tets, count: 0 })
+        let cells = cells_of(mesh);
+        Ok(Self { folder: out.to_path_buf(), index, fields: fields.to_vec(), cells, count: 0 })
     }
 
     /// What the fields read of a state.
@@ -61,7 +63,7 @@ impl Frames {
     ///
     /// # Errors
     /// A file cannot be written.
-    pub fn write(&mut self, mesh: &TetMesh, time: f64, data: &FrameData) -> Result<(), OutputError> {
+    pub fn write(&mut self, mesh: &Mesh, time: f64, data: &FrameData) -> Result<(), OutputError> {
         let mut points: Vec<(&str, usize, Vec<f64>)> = Vec::new();
         let mut cells: Vec<(&str, usize, Vec<f64>)> = Vec::new();
         let volume = |e: usize| current_volume(mesh, e, &data.displacement);
@@ -85,7 +87,7 @@ impl Frames {
             }
         }
         let name = format!("frames/{}", frame_name(self.count));
-        write_vtu(&self.folder.join(&name), mesh.nodes(), &self.tets, &arrays(&points), &arrays(&cells))?;
+        write_vtu(&self.folder.join(&name), mesh.nodes(), &self.cells, &arrays(&points), &arrays(&cells))?;
         self.index.push(time, &name)?;
         self.count += 1;
         Ok(())
@@ -101,4 +103,15 @@ fn arrays<'a>(fields: &'a [(&'a str, usize, Vec<f64>)]) -> Vec<Array<'a>> {
         .iter()
         .map(|(name, components, values)| Array { name, components: *components, values: FieldValues::F64(values) })
         .collect()
+}
+
+/// The elements as VTK has them.
+fn cells_of(mesh: &Mesh) -> Cells {
+    let mut cells = Cells::default();
+    for element in mesh.elements() {
+        let (vtk, nodes) = (&mesh.kind(element).info.vtk, mesh.element_nodes(element));
+        // VTK's cell types are below 256.
+        cells.push(vtk.kind as u8, vtk.order.iter().map(|j| nodes[*j].0));
+    }
+    cells
 }

@@ -1,14 +1,12 @@
 //! What a scene will compute, and what it leaves out: laws, kernels, passes, memory.
 
 use serde_json::{Value, json};
-use tensormass_kernels::{LawEntry, LawInfo};
+use tensormass_kernels::{ElementInfo, LawEntry, LawInfo};
 
+use crate::body::LawBatch;
 use crate::mesh::Quality;
 use crate::model::Model;
 use crate::scene::{Integrator, Precision, Scene};
-
-/// Operations of the linear tetrahedron around a point kernel, counted in its generated text.
-use tensormass_kernels::generated::tetrahedron_p1::{CONTRACT_OPERATIONS, GRADIENT_OPERATIONS};
 
 /// How buffers are laid out: they differ between the CPU and GPUs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,6 +22,8 @@ pub enum Layout {
 pub struct PlannedLaw {
     /// The law.
     pub info: &'static LawInfo,
+    /// The kind of element.
+    pub element: &'static ElementInfo,
     /// Elements.
     pub elements: usize,
     /// Constants stored: for each element, or once.
@@ -85,13 +85,14 @@ impl Plan {
             .batches
             .iter()
             .map(|b| {
-                let mut law = law(b.law.info, b.elements.len(), b.per_element, implicit, proportional);
-                law.kernels
-                    .extend(damping_kernels(b.law).filter(|(name, _)| viscous && (implicit || *name == "damping")));
+                let mut law = law(b, implicit, proportional);
+                let damping = damping_kernels(b.law, b.element.info);
+                law.kernels.extend(damping.filter(|(name, _)| viscous && (implicit || *name == "damping")));
                 law
             })
             .collect();
         let (nodes, elements) = (model.body.masses.len(), model.body.elements.len());
+        let (slots, points) = (model.body.elements.values().len(), model.body.rest.values().len());
         let vectors = if implicit { 20 + 2 * usize::from(viscous || proportional) } else { 6 };
         let constants: usize = model.body.batches.iter().map(|b| b.constants.len()).sum();
         let with_domain = model.body.batches.iter().filter(|b| b.law.info.domain.is_some());
@@ -103,11 +104,11 @@ impl Plan {
                     Precision::F64 => 8,
                 };
                 vec![
-                    ("element nodes", 16 * elements),
-                    ("rest data", 10 * real * elements),
+                    ("element nodes", 4 * slots),
+                    ("rest data", 10 * real * points),
                     ("material constants", real * constants),
-                    ("partial forces", 12 * real * elements),
-                    ("node slots", 4 * (4 * elements + nodes + 1)),
+                    ("partial forces", 3 * real * slots),
+                    ("node slots", 4 * (slots + nodes + 1)),
                     ("state and work vectors", vectors * 3 * real * nodes),
                 ]
             }
@@ -177,7 +178,7 @@ impl Plan {
                 let kernels: serde_json::Map<String, Value> =
                     l.kernels.iter().map(|(k, n)| ((*k).to_string(), json!(n))).collect();
                 json!({
-                    "law": l.info.name, "elements": l.elements, "constants_per_element": l.per_element,
+                    "law": l.info.name, "element": l.element.name, "elements": l.elements, "constants_per_element": l.per_element,
                     "operations_per_element": kernels, "reviewed": l.info.reviewed,
                 })
             })
@@ -196,30 +197,41 @@ impl Plan {
     }
 }
 
+/// Operations of an element: those of its points, each with some gradients, its law, and what follows.
+fn operations(element: &ElementInfo, gradients: u32, then: u32) -> u32 {
+    element.points.len() as u32 * (gradients * element.gradient_operations + then)
+}
+
+fn point_operations(law: &LawInfo, kernel: &str) -> u32 {
+    law.operations.iter().find(|o| o.kernel == kernel).map_or(0, |o| o.arithmetic())
+}
+
 /// The kernels of a law's damping, each with its operations an element.
-fn damping_kernels(law: &LawEntry) -> impl Iterator<Item = (&'static str, u32)> {
+fn damping_kernels(law: &LawEntry, element: &'static ElementInfo) -> impl Iterator<Item = (&'static str, u32)> {
     let (info, linear) = (law.info, law.damping.map(|damping| damping.linear));
-    let point = |name: &str| info.operations.iter().find(|o| o.kernel == name).map_or(0, |o| o.arithmetic());
+    let point = |name: &str| point_operations(info, name);
     let gathers = if linear == Some(true) { 2 } else { 3 };
+    let (contract, nodes) = (element.contract_operations, element.nodes as u32);
     let kernels = [
-        ("damping", 2 * GRADIENT_OPERATIONS + point("damping") + CONTRACT_OPERATIONS),
-        ("ddamping", gathers * GRADIENT_OPERATIONS + point("ddamping") + CONTRACT_OPERATIONS),
-        ("damping_diagonal", (gathers - 1) * GRADIENT_OPERATIONS + 4 * point("damping_diagonal")),
+        ("damping", operations(element, 2, point("damping") + contract)),
+        ("ddamping", operations(element, gathers, point("ddamping") + contract)),
+        ("damping_diagonal", operations(element, gathers - 1, nodes * point("damping_diagonal"))),
     ];
     kernels.into_iter().filter(move |_| linear.is_some())
 }
 
-fn law(info: &'static LawInfo, elements: usize, per_element: bool, implicit: bool, proportional: bool) -> PlannedLaw {
-    let point = |name: &str| info.operations.iter().find(|o| o.kernel == name).map_or(0, |o| o.arithmetic());
+fn law(batch: &LawBatch, implicit: bool, proportional: bool) -> PlannedLaw {
+    let (info, element) = (batch.law.info, batch.element.info);
+    let point = |name: &str| point_operations(info, name);
     let gathers = if info.structure.linear { 1 } else { 2 };
-    let mut kernels = vec![("force", GRADIENT_OPERATIONS + point("force") + CONTRACT_OPERATIONS)];
+    let mut kernels = vec![("force", operations(element, 1, point("force") + element.contract_operations))];
     if implicit || proportional {
-        kernels.push(("dforce", gathers * GRADIENT_OPERATIONS + point("dforce") + CONTRACT_OPERATIONS));
+        kernels.push(("dforce", operations(element, gathers, point("dforce") + element.contract_operations)));
     }
     if implicit {
-        kernels.push(("diagonal", GRADIENT_OPERATIONS + 4 * point("diagonal")));
+        kernels.push(("diagonal", operations(element, 1, element.nodes as u32 * point("diagonal"))));
     }
-    PlannedLaw { info, elements, per_element, kernels }
+    PlannedLaw { info, element, elements: batch.elements.len(), per_element: batch.per_element, kernels }
 }
 
 fn scope(scene: &Scene, model: &Model, implicit: bool) -> (Vec<String>, Vec<String>) {

@@ -1,8 +1,7 @@
 //! Probes: numbers read off a state, by name.
 
 use crate::body::Constraint;
-use crate::mesh::TetMesh;
-use crate::model::loads::area;
+use crate::mesh::{ElementId, Mesh, integrals};
 use crate::model::place::Places;
 use crate::scene::{Component, EnergyPart, Probe, Scene, SceneError, Statistic, StressComponent};
 
@@ -72,7 +71,7 @@ impl Recorder {
     /// Resolves the probes of a scene.
     pub(crate) fn new(
         scene: &Scene,
-        mesh: &TetMesh,
+        mesh: &Mesh,
         places: &Places,
         constraints: &[Constraint],
     ) -> Result<Self, SceneError> {
@@ -158,11 +157,11 @@ impl Recorder {
     }
 
     /// The value of each probe.
-    pub fn read(&self, mesh: &TetMesh, state: &Snapshot) -> Vec<f64> {
+    pub fn read(&self, mesh: &Mesh, state: &Snapshot) -> Vec<f64> {
         self.readers.iter().map(|r| self.value(r, mesh, state)).collect()
     }
 
-    fn value(&self, reader: &Reader, mesh: &TetMesh, state: &Snapshot) -> f64 {
+    fn value(&self, reader: &Reader, mesh: &Mesh, state: &Snapshot) -> f64 {
         match reader {
             Reader::Displacement { nodes, component, statistic } => {
                 let values = nodes.iter().map(|&n| (of_vector(state.displacement[n as usize], *component), 1.0));
@@ -241,22 +240,34 @@ pub fn of_stress(s: &[f64; 9], component: StressComponent) -> f64 {
     }
 }
 
-/// The volume of an element displaced by u (m^3), negative where it is inside out.
-pub fn current_volume(mesh: &TetMesh, e: usize, u: &[[f64; 3]]) -> f64 {
-    let nodes = mesh.tets()[e].map(crate::mesh::NodeId::index);
-    let edge = |a: usize| -> [f64; 3] {
-        let (p, q) = (nodes[a], nodes[0]);
-        std::array::from_fn(|i| (mesh.nodes()[p][i] - mesh.nodes()[q][i]) + (u[p][i] - u[q][i]))
-    };
-    let (a, b, c) = (edge(1), edge(2), edge(3));
-    let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
-    a.iter().zip(cross).map(|(x, y)| x * y).sum::<f64>() / 6.0
+/// The volume of an element displaced by u (m^3), the integral of det F; negative where it is inside out.
+pub fn current_volume(mesh: &Mesh, e: usize, u: &[[f64; 3]]) -> f64 {
+    let element = ElementId(e as u32);
+    let (info, nodes) = (mesh.kind(element).info, mesh.element_nodes(element));
+    let first = u[nodes[0].index()];
+    let mut volume = 0.0;
+    for (at, rest) in info.points.iter().zip(mesh.rest(element)) {
+        let mut f = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        for (node, slopes) in nodes.iter().zip(at.gradients).skip(1) {
+            let u = u[node.index()];
+            for k in 0..3 {
+                let gradient: f64 = (0..info.dimension).map(|a| slopes[a] * rest.inverse_jacobian[3 * a + k]).sum();
+                for i in 0..3 {
+                    f[i][k] += (u[i] - first[i]) * gradient;
+                }
+            }
+        }
+        let [a, b, c] = f;
+        let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
+        volume += rest.weight * a.iter().zip(cross).map(|(x, y)| x * y).sum::<f64>();
+    }
+    volume
 }
 
 /// The area at rest of the boundary faces whose nodes are all selected.
-fn end_area(mesh: &TetMesh, nodes: &[u32]) -> f64 {
+fn end_area(mesh: &Mesh, nodes: &[u32]) -> f64 {
     let selected: std::collections::HashSet<u32> = nodes.iter().copied().collect();
-    let faces = mesh.boundary_faces();
-    let inside = faces.iter().filter(|f| f.iter().all(|n| selected.contains(&n.0)));
-    inside.map(|f| area(f.map(|n| mesh.nodes()[n.index()]))).sum()
+    let faces = mesh.boundary().into_iter().map(|face| (face, mesh.face_nodes(face)));
+    let inside = faces.filter(|(_, nodes)| nodes.iter().all(|n| selected.contains(&n.0)));
+    inside.map(|(face, nodes)| integrals(mesh.face_kind(face), &mesh.positions(&nodes)).iter().sum::<f64>()).sum()
 }

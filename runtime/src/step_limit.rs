@@ -12,12 +12,11 @@
 
 use std::collections::HashMap;
 
-use nalgebra::{Matrix3, SMatrix, SymmetricEigen};
-use tensormass_kernels::batch::{Batch, RestElement};
+use nalgebra::DMatrix;
 
 use crate::backend::{Backend, ForceField};
 use crate::body::Body;
-use crate::cpu::Precision;
+use crate::cpu::{Kernels, Part};
 use crate::system::System;
 
 /// The critical steps of a body.
@@ -40,35 +39,30 @@ fn step_of(k: f64, c: f64) -> f64 {
 
 /// The safe step: 2 / sqrt of the largest eigenvalue of any element's M_e^-1 K_e at rest.
 ///
-/// The non-zero eigenvalues of M_e^-1 K_e are those of the 9 x 9 matrix H^1/2 (d2W/dG2) H^1/2 with
-/// H = (4 / rho) sum_a grad Lambda_a (x) grad Lambda_a. Congruent elements of one material are computed once. Damping
-/// counts with its own largest eigenvalue, at rest.
+/// Congruent elements of one material are computed once. Damping counts with its own largest eigenvalue, at rest.
 pub fn element_limit(body: &Body) -> f64 {
-    let mut known: HashMap<(Vec<u64>, [u64; 11]), f64> = HashMap::new();
+    let mut known: HashMap<Vec<u64>, f64> = HashMap::new();
     let mut least = f64::INFINITY;
-    for batch in &body.batches {
+    for (number, batch) in body.batches.iter().enumerate() {
         let count = batch.law.info.constants.len();
-        let kernels = <f64 as Precision>::kernels(batch.law);
-        let damping = <f64 as Precision>::damping_kernels(batch.law);
+        let kernels = Kernels::<f64>::new(batch.element, batch.law);
         for (i, &e) in batch.elements.iter().enumerate() {
             let rest = &body.rest[e as usize];
             let start = if batch.per_element { i * count } else { 0 };
             let constants = &batch.constants[start..start + count];
-            let density = body.element_masses[e as usize] / rest.volume;
-            let mut shape = [0; 11];
-            for (bits, x) in shape.iter_mut().zip(rest.shape_gradients.iter().chain([&density])) {
-                *bits = x.to_bits();
-            }
-            shape[10] = std::ptr::from_ref(batch.law) as u64;
-            let material = constants.iter().map(|c| c.to_bits()).collect();
-            let value = *known.entry((material, shape)).or_insert_with(|| {
-                let still = [[0.0; 3]; 4];
-                let k = element_eigenvalue(|b, x, y| (kernels.dforce)(b, &still, x, y), constants, rest, density);
-                let viscous = damping.map_or(0.0, |damping| {
-                    let product =
-                        |b: &Batch<f64>, x: &Nodal, y: &mut Slots| (damping.ddamping)(b, &still, &still, x, y);
-                    element_eigenvalue(product, constants, rest, density)
-                });
+            let mass = body.element_masses[e as usize];
+            let numbers = rest.iter().flat_map(|r| r.inverse_jacobian.iter().chain([&r.weight]));
+            let mut key = vec![number as u64];
+            key.extend(numbers.chain(constants).chain([&mass]).map(|x| x.to_bits()));
+            let value = *known.entry(key).or_insert_with(|| {
+                let part = Part { nodes: &numbers_to(kernels.nodes()), rest, constants, stride: 0, count };
+                let still = vec![[0.0; 3]; kernels.nodes()];
+                let masses: Vec<f64> = batch.element.info.lumping.iter().map(|m| m * mass).collect();
+                let k = element_eigenvalue(|x, y| kernels.dforce(&part, &still, x, y), &masses);
+                let viscous = match batch.law.damping {
+                    Some(_) => element_eigenvalue(|x, y| kernels.ddamping(&part, [&still, &still, x], y), &masses),
+                    None => 0.0,
+                };
                 step_of(k, viscous + body.stiffness_damping * k)
             });
             least = least.min(value);
@@ -77,48 +71,24 @@ pub fn element_limit(body: &Body) -> f64 {
     least
 }
 
-/// A vector at the nodes of one element.
-type Nodal = [[f64; 3]; 4];
-/// The slots of one element.
-type Slots = [Nodal; 1];
+fn numbers_to(n: usize) -> Vec<u32> {
+    (0..n as u32).collect()
+}
 
 /// The largest eigenvalue of an element's M_e^-1 K_e, where `product` is -K_e du.
-fn element_eigenvalue(
-    product: impl Fn(&Batch<f64>, &Nodal, &mut Slots),
-    constants: &[f64],
-    rest: &RestElement<f64>,
-    density: f64,
-) -> f64 {
-    let g = rest.shape_gradients;
-    let row = |a: usize| nalgebra::Vector3::new(g[3 * a], g[3 * a + 1], g[3 * a + 2]);
-    let others = [row(0), row(1), row(2)];
-    let first = -(others[0] + others[1] + others[2]);
-    let metric: Matrix3<f64> =
-        others.iter().chain([&first]).map(|n| n * n.transpose()).sum::<Matrix3<f64>>() * (4.0 / density);
-    // A reference element with unit gradients turns the nodal kernel into the point kernel: u_j is column j of G.
-    let unit = RestElement { shape_gradients: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], volume: 1.0 };
-    let (nodes, units) = ([[0, 1, 2, 3]], [unit]);
-    let batch = Batch { nodes: &nodes, rest: &units, constants, stride: 0, count: constants.len() };
-    let mut tangent = SMatrix::<f64, 9, 9>::zeros();
-    for column in 0..9 {
-        let mut du = [[0.0; 3]; 4];
-        du[column % 3 + 1][column / 3] = 1.0;
-        let mut df = [[[0.0; 3]; 4]];
-        product(&batch, &du, &mut df);
-        for line in 0..9 {
-            tangent[(line, column)] = -df[0][line % 3 + 1][line / 3];
+fn element_eigenvalue(product: impl Fn(&[[f64; 3]], &mut [[f64; 3]]), masses: &[f64]) -> f64 {
+    let n = masses.len();
+    let mut stiffness = DMatrix::<f64>::zeros(3 * n, 3 * n);
+    for column in 0..3 * n {
+        let (mut du, mut df) = (vec![[0.0; 3]; n], vec![[0.0; 3]; n]);
+        du[column / 3][column % 3] = 1.0;
+        product(&du, &mut df);
+        for line in 0..3 * n {
+            let scale = (masses[line / 3] * masses[column / 3]).sqrt();
+            stiffness[(line, column)] = -df[line / 3][line % 3] / scale;
         }
     }
-    let eigen = SymmetricEigen::new(metric);
-    let root = eigen.eigenvectors
-        * Matrix3::from_diagonal(&eigen.eigenvalues.map(|x| x.max(0.0).sqrt()))
-        * eigen.eigenvectors.transpose();
-    let mut both = SMatrix::<f64, 9, 9>::zeros();
-    for i in 0..3 {
-        both.fixed_view_mut::<3, 3>(3 * i, 3 * i).copy_from(&root);
-    }
-    let product = both * tangent * both;
-    let symmetric = (product + product.transpose()) * 0.5;
+    let symmetric = (&stiffness + stiffness.transpose()) * 0.5;
     symmetric.symmetric_eigenvalues().max()
 }
 

@@ -211,7 +211,7 @@ fn check_slabs(slabs: &[(&str, f64)]) {
         let alone = of(&[*slab]);
         let (_, own_energies, own_stresses) = forces(&alone, &u);
         for e in all.mesh.elements() {
-            let corners = all.mesh.corners(e);
+            let corners = all.mesh.positions(all.mesh.element_nodes(e));
             let x = corners.iter().map(|p| p[0]).sum::<f64>() / 4.0;
             if (x / 4.0 * slabs.len() as f64) as usize == i {
                 let name = format!("{slabs:?}, seed {seed}, element {e:?} of slab {i}");
@@ -225,7 +225,7 @@ fn check_slabs(slabs: &[(&str, f64)]) {
         let own = stiffened(entry, slab.1, 1.0);
         let mut body = body(&mesh, entry, &own, &[]);
         let place = |e: &u32| {
-            let corners = mesh.corners(tensormass_runtime::mesh::ElementId(*e));
+            let corners = mesh.positions(mesh.element_nodes(tensormass_runtime::mesh::ElementId(*e)));
             (corners.iter().map(|p| p[0]).sum::<f64>() / 16.0 * slabs.len() as f64) as usize
         };
         body.batches[0].elements.retain(|e| place(e) == i);

@@ -12,7 +12,7 @@ use tensormass_runtime::integrate::{
     CentralDifference, ImplicitEuler, NewtonLimits, SemiImplicitEuler, SolverSettings,
 };
 use tensormass_runtime::laws;
-use tensormass_runtime::mesh::{Groups, NodeId, TetMesh, beam};
+use tensormass_runtime::mesh::{Groups, Mesh, NodeId, beam};
 use tensormass_runtime::model::build;
 use tensormass_runtime::plan::{Layout, Plan};
 use tensormass_runtime::scene::{Preconditioner, Scene};
@@ -55,7 +55,8 @@ const CORNERS: [[f64; 3]; 4] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.2
 
 /// One element whose last node moves along the first `free` axes.
 fn one_element(law: &'static LawEntry, parameters: &[f64], free: u8) -> Cpu<f64> {
-    let mesh = TetMesh::new(CORNERS.to_vec(), vec![[0, 1, 2, 3].map(NodeId)], Groups::default()).expect("one element");
+    let mesh =
+        Mesh::tetrahedra(CORNERS.to_vec(), vec![[0, 1, 2, 3].map(NodeId)], Groups::default()).expect("one element");
     let held = (0..4).flat_map(|n| (0..3).map(move |c| (n, c, 0.0))).filter(|&(n, c, _)| n < 3 || c >= free);
     system(body(&mesh, law, parameters, &held.collect::<Vec<_>>()))
 }
@@ -180,10 +181,10 @@ fn viscosity_of_an_element() {
     let (eta, zeta) = (300.0, 600.0);
     let mut system = one_element(law, &viscous(law, eta), 1);
     let [_, _, c] = oscillator(&mut system);
-    let rest = system.body.rest[0];
-    let n = &rest.shape_gradients[6..9];
+    let rest = system.body.rest[0][0];
+    let n = &rest.inverse_jacobian[6..9];
     let square: f64 = n.iter().map(|x| x * x).sum();
-    let wanted = rest.volume * (eta * (square + n[0] * n[0]) + (zeta - 2.0 / 3.0 * eta) * n[0] * n[0]);
+    let wanted = rest.weight * (eta * (square + n[0] * n[0]) + (zeta - 2.0 / 3.0 * eta) * n[0] * n[0]);
     check("c", c, wanted, 1e-14);
 }
 

@@ -123,7 +123,7 @@ fn check(law: &LawEntry) {
     let model = build(&scene(&material(law, "all", |k| format!("{:?}", vector(k, 1.0))), 0.1, at));
     let model = model.unwrap_or_else(|e| panic!("{e}"));
     let left = |e: tensormass_runtime::mesh::ElementId| {
-        model.mesh.corners(e).iter().map(|corner| corner[0]).sum::<f64>() / 4.0 < 1.0
+        model.mesh.positions(model.mesh.element_nodes(e)).iter().map(|corner| corner[0]).sum::<f64>() / 4.0 < 1.0
     };
     for k in 0..2 {
         let mut rows = String::from("# x, y, z\n");

@@ -11,7 +11,7 @@ use tensormass_runtime::integrate::{
     CentralDifference, ImplicitEuler, NewtonLimits, SemiImplicitEuler, SolverSettings, central_difference_coefficients,
 };
 use tensormass_runtime::laws;
-use tensormass_runtime::mesh::{Groups, NodeId, TetMesh, beam};
+use tensormass_runtime::mesh::{Groups, Mesh, NodeId, beam};
 use tensormass_runtime::scene::Preconditioner;
 use tensormass_runtime::step_limit::power_limit;
 use tensormass_runtime::system::{Integrator, State};
@@ -44,7 +44,7 @@ fn advance(system: &mut Cpu<f64>, stepper: &mut Stepper, state: &mut State<CpuBa
 /// One element whose last node moves along the first `free` axes.
 fn one_element(law: &'static LawEntry, free: u8) -> Cpu<f64> {
     let nodes = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.2, 0.3, 1.0]];
-    let mesh = TetMesh::new(nodes, vec![[0, 1, 2, 3].map(NodeId)], Groups::default()).expect("one element");
+    let mesh = Mesh::tetrahedra(nodes, vec![[0, 1, 2, 3].map(NodeId)], Groups::default()).expect("one element");
     let held = (0..4).flat_map(|n| (0..3).map(move |c| (n, c, 0.0))).filter(|&(n, c, _)| n < 3 || c >= free);
     system(body(&mesh, law, &parameters(law), &held.collect::<Vec<_>>()))
 }

@@ -8,7 +8,8 @@ use std::path::Path;
 use tempfile::{TempDir, tempdir};
 use tensormass_runtime::mesh::beam;
 use tensormass_runtime::output::{
-    Field, FieldValues, OutputError, ProbeTable, PvdWriter, create_folder, write_atomic, write_json_atomic, write_vtu,
+    Cells, Field, FieldValues, OutputError, ProbeTable, PvdWriter, create_folder, write_atomic, write_json_atomic,
+    write_vtu,
 };
 
 fn folder() -> TempDir {
@@ -93,6 +94,13 @@ fn bytes<T: Copy, const N: usize>(values: &[T], to_bytes: fn(T) -> [u8; N]) -> V
     values.iter().flat_map(|value| to_bytes(*value)).collect()
 }
 
+/// Tetrahedra as cells.
+fn tetrahedra(tets: &[[u32; 4]]) -> Cells {
+    let mut cells = Cells::default();
+    tets.iter().for_each(|tet| cells.push(10, *tet));
+    cells
+}
+
 #[test]
 fn vtu_reads_back_bit_for_bit() {
     let folder = folder();
@@ -101,6 +109,7 @@ fn vtu_reads_back_bit_for_bit() {
         let mesh = beam([3.0, 1.0, 0.1], cells, [0.1; 3]).expect("a valid beam");
         let (points, elements) = (mesh.nodes().len(), mesh.tets().len());
         let tets: Vec<[u32; 4]> = mesh.tets().iter().map(|tet| tet.map(|node| node.0)).collect();
+        let cells_of_file = tetrahedra(&tets);
         let special = [f64::NAN, f64::INFINITY, -0.0, 5e-324, f64::MIN_POSITIVE / 3.0, 1.0 / 3.0];
         let displacement: Vec<f64> = (0..3 * points).map(|i| special[i % 6] * (1.0 + i as f64)).collect();
         let pressure: Vec<f32> = (0..points).map(|i| (i as f32).sin()).collect();
@@ -115,9 +124,9 @@ fn vtu_reads_back_bit_for_bit() {
             Field { name: "material", components: 1, values: FieldValues::U32(&material) },
         ];
         let path = folder.path().join("frame.vtu");
-        write_vtu(&path, mesh.nodes(), &tets, &point_fields, &cell_fields).expect("a writable folder");
+        write_vtu(&path, mesh.nodes(), &cells_of_file, &point_fields, &cell_fields).expect("a writable folder");
         let first = fs::read(&path).expect("a file");
-        write_vtu(&path, mesh.nodes(), &tets, &point_fields, &cell_fields).expect("a writable folder");
+        write_vtu(&path, mesh.nodes(), &cells_of_file, &point_fields, &cell_fields).expect("a writable folder");
         assert!(first == fs::read(&path).expect("a file"), "{cells:?}: the same input gives the same file");
 
         let vtu = read_vtu(&path);
@@ -149,7 +158,8 @@ fn vtu_refuses_fields_that_do_not_fit() {
     let path = folder.path().join("frame.vtu");
     let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let check = |tets: &[[u32; 4]], point_fields: &[Field<'_>], cell_fields: &[Field<'_>], reason: &str| {
-        let error = write_vtu(&path, &points, tets, point_fields, cell_fields).expect_err(reason).to_string();
+        let error =
+            write_vtu(&path, &points, &tetrahedra(tets), point_fields, cell_fields).expect_err(reason).to_string();
         let remedy = "give every array the length that its points, elements or columns ask for";
         assert_eq!(error, format!("cannot write {}: {reason}; {remedy}", path.display()));
         assert!(names(folder.path()).is_empty(), "nothing is written");
@@ -162,7 +172,7 @@ fn vtu_refuses_fields_that_do_not_fit() {
     check(&one, &[], &[s], "cell field `s` has 0 values, 1 cells of 0 components were expected");
     let v = field("v", 1, &[0.0; 4]);
     check(&one, &[v, v], &[], "there are two point fields `v`");
-    check(&[[0, 1, 2, 4]], &[], &[], "cell 0 names points [0, 1, 2, 4], there are 4");
+    check(&[[0, 1, 2, 4]], &[], &[], "cell 0 names point 4, there are 4");
 }
 
 #[test]
@@ -247,7 +257,7 @@ fn unwritable_places_are_refused_with_a_remedy() {
     let missing = folder.path().join("missing");
     let write = |path: &Path| -> [Result<(), OutputError>; 4] {
         [
-            write_vtu(path, &[], &[], &[], &[]),
+            write_vtu(path, &[], &Cells::default(), &[], &[]),
             PvdWriter::create(path).map(drop),
             ProbeTable::create(path, &["time_s"]).map(drop),
             write_json_atomic(path, &serde_json::Value::Null),

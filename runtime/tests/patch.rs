@@ -10,7 +10,7 @@ use tensormass_runtime::backend::{Backend, ForceField};
 use tensormass_runtime::cg::CgLimits;
 use tensormass_runtime::cpu::Precision;
 use tensormass_runtime::integrate::{NewtonLimits, SolverSettings, Statics};
-use tensormass_runtime::mesh::{Groups, NodeId, TetMesh};
+use tensormass_runtime::mesh::{Groups, Mesh, NodeId};
 use tensormass_runtime::scene::Preconditioner;
 use tensormass_runtime::system::Integrator;
 use tensormass_runtime::{LawEntry, laws};
@@ -22,7 +22,7 @@ fn product(a: &Matrix, b: &Matrix) -> Matrix {
 }
 
 struct Patch {
-    mesh: TetMesh,
+    mesh: Mesh,
     gradient: Matrix,
 }
 
@@ -31,7 +31,7 @@ fn patch() -> Patch {
     let list = |key: &str| file[key].as_array().expect("a list").clone();
     let nodes = list("nodes").iter().map(numbers::<3>).collect();
     let tets = list("tets").iter().map(|t| numbers::<4>(t).map(|n| NodeId(n as u32))).collect();
-    let mesh = TetMesh::new(nodes, tets, Groups::default()).expect("the reference's mesh is valid");
+    let mesh = Mesh::tetrahedra(nodes, tets, Groups::default()).expect("the reference's mesh is valid");
     Patch { mesh, gradient: std::array::from_fn(|i| numbers(&file["G"][i])) }
 }
 

@@ -9,13 +9,13 @@ mod support;
 use nalgebra::{DMatrix, SymmetricEigen};
 use support::{Cpu, Random, body, parameters, system};
 use tensormass_runtime::backend::{Backend, ForceField};
-use tensormass_runtime::mesh::{Groups, TetMesh, beam};
+use tensormass_runtime::mesh::{Groups, Mesh, beam};
 use tensormass_runtime::{LawEntry, laws};
 
 const BOUND: f64 = 100.0 * f64::EPSILON;
 
 struct Case {
-    mesh: TetMesh,
+    mesh: Mesh,
     system: Cpu<f64>,
     law: &'static LawEntry,
     /// The largest diagonal entry of K at rest.
@@ -29,7 +29,7 @@ fn free(law: &'static LawEntry, random: &mut Random) -> Case {
         let d = random.vector(0.05);
         std::array::from_fn(|c| p[c] + d[c])
     });
-    let mesh = TetMesh::new(nodes.collect(), regular.tets().to_vec(), Groups::default()).expect("a valid mesh");
+    let mesh = Mesh::tetrahedra(nodes.collect(), regular.tets().to_vec(), Groups::default()).expect("a valid mesh");
     let mut system = system::<f64>(body(&mesh, law, &parameters(law), &[]));
     let rest = system.backend.zeros();
     let d = diagonal(&mut system, &rest);

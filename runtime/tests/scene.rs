@@ -31,7 +31,7 @@ integrator = "static"
 #[test]
 fn shipped_scenes_say_what_the_paper_says() {
     let scene = shipped("traction.toml", &[]);
-    let beam = Beam { size: [5.0, 1.0, 1.0], cells: [20, 10, 10], origin: [0.0; 3] };
+    let beam = Beam { size: [5.0, 1.0, 1.0], cells: [20, 10, 10], origin: [0.0; 3], element: "tetrahedron_p1".into() };
     assert_eq!(scene.mesh, Mesh::Beam { beam });
     assert_eq!((scene.material[0].law.as_str(), scene.material[0].density), ("hooke", 1000.0));
     assert_eq!(scene.material[0].parameters["young"], Parameter::Constant(ParameterValue::Number(1e8)));

@@ -8,7 +8,7 @@ use serde_json::Value;
 use support::{Random, body, case, number, numbers, parameters, scene, system};
 use tensormass_runtime::backend::Backend;
 use tensormass_runtime::laws;
-use tensormass_runtime::mesh::{Groups, TetMesh, beam};
+use tensormass_runtime::mesh::{Groups, Mesh, beam};
 use tensormass_runtime::model::build;
 use tensormass_runtime::simulate::{Ending, Observer, run};
 use tensormass_runtime::step_limit::{StepLimits, element_limit, power_limit};
@@ -88,7 +88,8 @@ fn the_element_bound_is_below_the_limit() {
                 let d = random.vector(0.04);
                 std::array::from_fn(|c| p[c] + d[c])
             });
-            let mesh = TetMesh::new(moved.collect(), regular.tets().to_vec(), Groups::default()).expect("a valid mesh");
+            let mesh =
+                Mesh::tetrahedra(moved.collect(), regular.tets().to_vec(), Groups::default()).expect("a valid mesh");
             let nodes = mesh.nodes().len() as u32;
             let fixed: Vec<_> = (0..nodes).filter(|n| (u64::from(*n) * 7 + seed) % 5 < seed % 3).collect();
             let fixed: Vec<_> = fixed.iter().flat_map(|&n| (0..3).map(move |c| (n, c, 0.0))).collect();

@@ -17,6 +17,7 @@ Tasks:
   reproduce tables-1-2 [--device cpu|cpu,gpu]
                      run the paper's traction test and its experiments, write docs/reproduction.md (some minutes)
   reproduce extremes measure the accuracy of every law, write docs/extremes.md
+  reproduce accuracy measure the accuracy of every element, write docs/accuracy.md
 
 Exit status: 0 done, 2 wrong arguments, 1 a step failed or is left to do (said on the error output).";
 
@@ -37,6 +38,7 @@ fn call(arguments: &[&str]) -> Result<(), Failure> {
         ["law", "unreviewed"] => law::unreviewed::call(),
         ["reproduce", "tables-1-2", options @ ..] => reproduce::call(options),
         ["reproduce", "extremes"] => reproduce::extremes::call(),
+        ["reproduce", "accuracy"] => reproduce::accuracy::call(),
         ["help" | "-h" | "--help"] => {
             say(USAGE);
             Ok(())
@@ -44,9 +46,9 @@ fn call(arguments: &[&str]) -> Result<(), Failure> {
         [] => Err(Failure::Usage("which task?".to_string())),
         ["law", "accept", ..] => Err(Failure::Usage("`law accept` takes the name of one law".to_string())),
         ["law", "unreviewed", ..] => Err(Failure::Usage("`law unreviewed` takes no arguments".to_string())),
-        ["reproduce", ..] => {
-            Err(Failure::Usage("`reproduce` takes tables-1-2, and --device after it, or extremes".to_string()))
-        }
+        ["reproduce", ..] => Err(Failure::Usage(
+            "`reproduce` takes tables-1-2, and --device after it, extremes, or accuracy".to_string(),
+        )),
         other => Err(Failure::Usage(format!("there is no task `{}`", other.join(" ")))),
     }
 }

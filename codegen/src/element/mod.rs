@@ -4,12 +4,18 @@
 //! displacements and contract a stress with the gradients, f_j = -w P grad Lambda_j. Because the functions sum to one,
 //! sum_j grad Lambda_j = 0: the gather subtracts the first node's displacement before it multiplies, which keeps the
 //! digits of a small strain in a large translation.
+//!
+//! With J = dX/dxi at a quadrature point, grad Lambda_j = J^-T dLambda_j/dxi: the gradients by the reference coordinates xi
+//! are a table of the element, J^-1 and the weight det J w are data of each point. Of a simplex with linear functions the
+//! rows of J^-1 are the gradients themselves, and one point suffices: its kernels are specialised so. In two dimensions
+//! strain is plane: nothing depends on z, and nothing moves along it.
 
 mod declaration;
+mod mapped;
 mod polynomial;
 mod shape;
 
-use num_traits::Zero;
+use num_traits::One;
 
 pub use declaration::{ElementDeclaration, Face, Numbering, Quadrature};
 pub use polynomial::Polynomial;
@@ -31,33 +37,26 @@ pub enum ElementError {
         /// What is wrong.
         reason: String,
     },
-    /// The gradients are not constant, or there are several quadrature points.
-    #[error(
-        "element `{0}`: only elements with constant gradients and one quadrature point are supported by this version"
-    )]
-    NotConstant(String),
     /// A printed kernel breaks a rule: a defect of the generator.
     #[error(transparent)]
     Invalid(#[from] InvalidKernel),
 }
 
-/// The kernels of an element.
+/// The kernels of an element at a quadrature point.
 #[derive(Debug, Clone)]
 pub struct ElementKernels {
-    /// The element's name.
-    pub name: String,
-    /// What it is.
-    pub docs: String,
+    /// What the element is.
+    pub declaration: ElementDeclaration,
     /// Number of nodes.
     pub nodes: u32,
-    /// Nodal displacements and shape gradients -> G.
+    /// Whether the rows of J^-1 are the gradients of all functions but the first, everywhere: a linear tetrahedron.
+    pub is_linear_simplex: bool,
+    /// Nodal displacements and gradients -> G.
     pub gradient: ValidKernel,
-    /// Stress, shape gradients and weight -> nodal forces.
+    /// Stress, gradients and weight -> nodal forces.
     pub contract: ValidKernel,
-    /// Shape gradients -> the gradients of all nodes.
+    /// Gradients -> the gradients of all nodes.
     pub node_gradients: ValidKernel,
-    /// Gradients of Lambda_j by the reference coordinates, one row a node.
-    pub reference_gradients: Vec<[Rational; 3]>,
 }
 
 /// The declarations of this crate, in the order of their names.
@@ -83,30 +82,40 @@ pub fn tetrahedron_p1() -> ElementDeclaration {
 /// Generates the kernels of an element.
 ///
 /// # Errors
-/// See [`ElementError`].
+/// [`ElementError::Invalid`].
 pub fn kernels(element: &ElementDeclaration) -> Result<ElementKernels, ElementError> {
-    let refuse = || ElementError::NotConstant(element.name.clone());
-    if element.quadrature.points.len() != 1 || element.shape.dimension() != 3 {
-        return Err(refuse());
-    }
-    let mut reference_gradients = Vec::new();
-    for f in &element.functions {
-        let mut row = [Rational::zero(); 3];
-        for (k, entry) in row.iter_mut().enumerate() {
-            *entry = f.derivative(k).as_constant().ok_or_else(refuse)?;
-        }
-        reference_gradients.push(row);
-    }
-    let n = element.functions.len() as u32;
+    let nodes = element.functions.len() as u32;
+    let is_linear_simplex = is_linear_simplex(element);
+    let dimension = element.shape.dimension();
+    let (gradient, contract, node_gradients) = if is_linear_simplex {
+        (gradient(nodes), contract(nodes), node_gradients(nodes))
+    } else {
+        (
+            mapped::gradient(nodes, dimension),
+            mapped::contract(nodes, dimension),
+            mapped::node_gradients(nodes, dimension),
+        )
+    };
     Ok(ElementKernels {
-        name: element.name.clone(),
-        docs: element.docs.clone(),
-        nodes: n,
-        gradient: gradient(n).validate()?,
-        contract: contract(n).validate()?,
-        node_gradients: node_gradients(n).validate()?,
-        reference_gradients,
+        declaration: element.clone(),
+        nodes,
+        is_linear_simplex,
+        gradient: gradient.validate()?,
+        contract: contract.validate()?,
+        node_gradients: node_gradients.validate()?,
     })
+}
+
+/// Whether there is one quadrature point, and function j > 0 is the coordinate j - 1 of three.
+fn is_linear_simplex(element: &ElementDeclaration) -> bool {
+    let coordinate = |k: usize| {
+        let mut exponents = [0; 3];
+        exponents[k] = 1;
+        Polynomial::monomial(Rational::one(), exponents)
+    };
+    element.quadrature.points.len() == 1
+        && element.functions.len() == 4
+        && (0..3).all(|k| element.functions[k + 1] == coordinate(k))
 }
 
 /// Component k of the gradient of node j >= 1.

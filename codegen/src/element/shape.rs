@@ -34,6 +34,11 @@ pub const SHAPES: [(&str, Shape); 6] = [
 ];
 
 impl Shape {
+    /// Its name in declarations.
+    pub fn name(self) -> &'static str {
+        SHAPES.iter().find(|(_, shape)| *shape == self).expect("every shape has a name").0
+    }
+
     /// How many coordinates it has.
     pub fn dimension(self) -> usize {
         match self {

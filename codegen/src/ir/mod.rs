@@ -75,6 +75,11 @@ pub enum Input {
     NodalDisplacement,
     /// The gradients of the interpolation functions at rest, 3 a node but the first, whose gradient is minus their sum.
     ShapeGradients,
+    /// The derivatives of the interpolation functions by the reference coordinates at a point, for each node but the first,
+    /// whose are minus their sum.
+    ReferenceGradients,
+    /// J^-1 = dxi/dX at a point, row by row: component 3 a + k is dxi_a/dX_k (1/m), 9 components.
+    InverseJacobian,
     /// The integration weight: rest volume times quadrature weight (m^3).
     Weight,
     /// P or dP, 9 components, to be contracted with the gradients.

@@ -34,6 +34,8 @@ const INPUTS: &[(Input, &str)] = &[
     (Input::NodeGradient, "node_gradient"),
     (Input::NodalDisplacement, "nodal_displacement"),
     (Input::ShapeGradients, "shape_gradients"),
+    (Input::ReferenceGradients, "reference_gradients"),
+    (Input::InverseJacobian, "inverse_jacobian"),
     (Input::Weight, "weight"),
     (Input::StressIn, "stress"),
 ];

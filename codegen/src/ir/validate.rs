@@ -27,8 +27,10 @@ pub struct InvalidKernel {
 
 fn input_length(role: Input) -> Option<u32> {
     match role {
-        Input::Parameters | Input::Constants | Input::NodalDisplacement | Input::ShapeGradients => None,
-        Input::DisplacementGradient | Input::GradientRate | Input::GradientIncrement | Input::StressIn => Some(9),
+        Input::Parameters | Input::Constants | Input::NodalDisplacement => None,
+        Input::ShapeGradients | Input::ReferenceGradients => None,
+        Input::DisplacementGradient | Input::GradientRate | Input::GradientIncrement => Some(9),
+        Input::StressIn | Input::InverseJacobian => Some(9),
         Input::NodeGradient => Some(3),
         Input::Weight => Some(1),
     }

@@ -67,6 +67,8 @@ pub fn letter(role: Input) -> &'static str {
         Input::NodeGradient => "n",
         Input::NodalDisplacement => "u",
         Input::ShapeGradients => "b",
+        Input::ReferenceGradients => "s",
+        Input::InverseJacobian => "j",
         Input::Weight => "w",
         Input::StressIn => "p",
     }
@@ -105,7 +107,7 @@ fn quantity(name: &str) -> &'static str {
         "damping" => "P_v = dD/d(dG/dt), the stress of damping, at G and its rate.",
         "ddamping" => "dP_v = d2D/d(dG/dt)2 : dG at G and its rate; dG is that of the rate.",
         "damping_diagonal" => "n . d2D/d(dG/dt)_i.d(dG/dt)_i. . n at G and its rate for i = 0, 1, 2.",
-        "gradient" => "G = sum_j u_j (x) grad Lambda_j; b holds grad Lambda_1, grad Lambda_2, ...",
+        "gradient" => "G = sum_j u_j (x) grad Lambda_j; gradients are those of nodes 1, 2, ...",
         "contract" => "f_j = -w P grad Lambda_j.",
         "node_gradients" => "grad Lambda_j of every node.",
         _ => "",

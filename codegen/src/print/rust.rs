@@ -71,16 +71,14 @@ fn damping(derivation: &Derivation) -> TokenStream {
     }
 }
 
-/// An element's module: its size, its kernels, and `more` items.
-pub fn element_module(element: &ElementKernels, more: &TokenStream) -> TokenStream {
-    let module = format_ident!("{}", element.name);
-    let docs = doc_comment(&element.docs);
+/// An element's module: what it is, and its kernels.
+pub fn element_module(element: &ElementKernels) -> TokenStream {
+    let declaration = &element.declaration;
+    let module = format_ident!("{}", declaration.name);
+    let docs = doc_comment(&declaration.docs);
     let nodes = plain(element.nodes as usize);
-    let rows = element.reference_gradients.iter().map(|row| {
-        let row = row.map(float);
-        quote!([#(#row),*])
-    });
-    let functions = [&element.gradient, &element.contract, &element.node_gradients].map(|kernel| {
+    let kernels = [&element.gradient, &element.contract, &element.node_gradients];
+    let functions = kernels.map(|kernel| {
         let name = format_ident!("{}", kernel.ir().name);
         let docs = doc_comment(&kernel_docs(kernel));
         let arguments = arguments(kernel);
@@ -91,21 +89,98 @@ pub fn element_module(element: &ElementKernels, more: &TokenStream) -> TokenStre
             pub fn #name<R: Real>(#(#arguments),*) -> #result { #body }
         }
     });
-    let (gather, contract) = (element.gradient.count().arithmetic(), element.contract.count().arithmetic());
+    let [gradient, contract, node_gradients] = kernels.map(|kernel| {
+        let name = format_ident!("{}", kernel.ir().name);
+        let arguments = kernel.ir().inputs.iter().map(|(role, _)| match role {
+            Input::NodalDisplacement => quote!(u.as_flattened().try_into().expect("one vector a node")),
+            // Of a linear simplex they are one.
+            Input::ShapeGradients | Input::InverseJacobian => quote!(inverse_jacobian),
+            Input::ReferenceGradients => quote!(slopes.try_into().expect("the element's table")),
+            Input::StressIn => quote!(stress),
+            _ => quote!(weight),
+        });
+        quote!(#name(#(#arguments),*))
+    });
+    let info = element_info(element);
     quote! {
         #docs
         pub mod #module {
             use ::tensormass_kernels::Real;
-            /// Additions, multiplications and divisions of `gradient`.
-            pub const GRADIENT_OPERATIONS: u32 = #gather;
-            /// Additions, multiplications and divisions of `contract`.
-            pub const CONTRACT_OPERATIONS: u32 = #contract;
             /// Nodes of the element.
             pub const NODES: usize = #nodes;
-            /// The gradients of the interpolation functions by the reference coordinates, one row a node.
-            pub const REFERENCE_GRADIENTS: [[f64; 3]; #nodes] = [#(#rows),*];
+            /// What the element is.
+            pub static INFO: ::tensormass_kernels::ElementInfo = #info;
+            /// The element.
+            #[derive(Debug, Clone, Copy)]
+            pub struct Element;
+            impl ::tensormass_kernels::Element for Element {
+                type Nodal<R: Real> = [[R; 3]; #nodes];
+                fn info() -> &'static ::tensormass_kernels::ElementInfo { &INFO }
+                fn nodal<R: Real>() -> [[R; 3]; #nodes] { [[R::from_f64(0.0); 3]; #nodes] }
+                #[inline(always)]
+                fn gradient<R: Real>(u: &[[R; 3]; #nodes], slopes: &[R], inverse_jacobian: &[R; 9]) -> [R; 9] { #gradient }
+                #[inline(always)]
+                fn contract<R: Real>(
+                    stress: &[R; 9], slopes: &[R], inverse_jacobian: &[R; 9], weight: R, forces: &mut [[R; 3]; #nodes],
+                ) {
+                    let f = #contract;
+                    for (force, f) in forces.iter_mut().zip(f.as_chunks::<3>().0) {
+                        for (force, f) in force.iter_mut().zip(f) {
+                            *force = *force + *f;
+                        }
+                    }
+                }
+                #[inline(always)]
+                fn node_gradients<R: Real>(slopes: &[R], inverse_jacobian: &[R; 9]) -> [[R; 3]; #nodes] {
+                    let n = #node_gradients;
+                    ::std::array::from_fn(|j| [n[3 * j], n[3 * j + 1], n[3 * j + 2]])
+                }
+            }
             #(#functions)*
-            #more
+        }
+    }
+}
+
+/// An element's tables.
+fn element_info(element: &ElementKernels) -> TokenStream {
+    let d = &element.declaration;
+    let (name, docs, source, linear) = (&d.name, d.docs.trim(), d.source.trim(), element.is_linear_simplex);
+    let shape = d.shape.name();
+    let (dimension, order) = (plain(d.shape.dimension()), Literal::u32_unsuffixed(d.order));
+    let nodes = plain(d.nodes.len());
+    let points = d.quadrature.points.iter().zip(&d.quadrature.weights).map(|(x, weight)| {
+        let functions = d.functions.iter().map(|f| signed(f.at_f64(x)));
+        let gradients = d.functions.iter().map(|f| {
+            let row = [0, 1, 2].map(|k| signed(f.derivative(k).at_f64(x)));
+            quote!([#(#row),*])
+        });
+        let weight = signed(*weight);
+        quote! {
+            ::tensormass_kernels::ReferencePoint {
+                weight: #weight, functions: &[#(#functions),*], gradients: &[#(#gradients),*],
+            }
+        }
+    });
+    let reference = d.nodes.iter().map(|x| {
+        let x = x.map(float);
+        quote!([#(#x),*])
+    });
+    let lumping = d.lumping.iter().map(|q| float(*q));
+    let [vtk, gmsh] = [&d.vtk, &d.gmsh].map(|numbering| {
+        let (kind, order) = (Literal::u32_unsuffixed(numbering.kind), numbering.order.iter().map(|k| plain(*k)));
+        quote!(::tensormass_kernels::Numbering { kind: #kind, order: &[#(#order),*] })
+    });
+    let faces = d.faces.iter().map(|face| {
+        let (element, nodes) = (&face.element, face.nodes.iter().map(|k| plain(*k)));
+        quote!(::tensormass_kernels::Face { element: #element, nodes: &[#(#nodes),*] })
+    });
+    let (gather, contract) = (element.gradient.count().arithmetic(), element.contract.count().arithmetic());
+    quote! {
+        ::tensormass_kernels::ElementInfo {
+            name: #name, docs: #docs, source: #source, shape: #shape, dimension: #dimension, order: #order, nodes: #nodes,
+            reference: &[#(#reference),*], is_linear_simplex: #linear, points: &[#(#points),*],
+            lumping: &[#(#lumping),*], vtk: #vtk, gmsh: #gmsh, faces: &[#(#faces),*],
+            gradient_operations: #gather, contract_operations: #contract,
         }
     }
 }

@@ -1,13 +1,13 @@
-//! The elements of a body on the CPU: one batch a law, two passes (Faure et al. 2012, Algorithm 1).
+//! The elements of a body on the CPU: one batch a law and kind, two passes (Faure et al. 2012, Algorithm 1).
 //!
 //! Pass 1 runs over elements and writes each node's partial force into a slot of its own; pass 2 runs over nodes and
 //! sums their slots in ascending order. No two threads write one place, and the sum does not depend on the thread
 //! count.
 
 use rayon::prelude::*;
-use tensormass_kernels::batch::{Batch, RestElement};
-use tensormass_kernels::{BatchKernels, DampingKernels};
+use tensormass_kernels::RestPoint;
 
+use super::kernels::{Kernels, Part};
 use super::{CpuBackend, Precision};
 use crate::backend::{Backend, ForceField, LeftDomain, Operator, REGISTERS, RUNNING, SUM};
 use crate::body::{Body, LawBatch};
@@ -16,18 +16,13 @@ use crate::mesh::{Incidence, NodeId};
 /// Elements a task.
 const CHUNK: usize = 512;
 
-/// Partial forces of one element: three components for each of its nodes.
-type Slots<R> = [[R; 3]; 4];
-
-/// The elements of one law.
+/// The elements of one law and kind.
 struct CpuBatch<R: Precision> {
     law: &'static str,
     domain: &'static str,
-    kernels: BatchKernels<R>,
-    /// Only where the law has a dissipation.
-    damping: Option<DampingKernels<R>>,
-    nodes: Vec<[u32; 4]>,
-    rest: Vec<RestElement<R>>,
+    kernels: Kernels<R>,
+    nodes: Vec<u32>,
+    rest: Vec<RestPoint<R>>,
     constants: Vec<R>,
     stride: usize,
     count: usize,
@@ -38,17 +33,15 @@ struct CpuBatch<R: Precision> {
 impl<R: Precision> CpuBatch<R> {
     fn new(body: &Body, batch: &LawBatch) -> Self {
         let round = |x: f64| R::from_f64(x);
-        let rest = |&e: &u32| {
-            let r = &body.rest[e as usize];
-            RestElement { shape_gradients: r.shape_gradients.map(round), volume: round(r.volume) }
-        };
+        let rest =
+            |r: &RestPoint<f64>| RestPoint { inverse_jacobian: r.inverse_jacobian.map(round), weight: round(r.weight) };
+        let elements = || batch.elements.iter().map(|&e| e as usize);
         Self {
             law: batch.law.info.name,
             domain: batch.law.info.domain.unwrap_or("everywhere"),
-            kernels: R::kernels(batch.law),
-            damping: R::damping_kernels(batch.law),
-            nodes: batch.elements.iter().map(|&e| body.elements[e as usize]).collect(),
-            rest: batch.elements.iter().map(rest).collect(),
+            kernels: Kernels::new(batch.element, batch.law),
+            nodes: elements().flat_map(|e| &body.elements[e]).copied().collect(),
+            rest: elements().flat_map(|e| &body.rest[e]).map(rest).collect(),
             constants: batch.constants.iter().map(|&c| round(c)).collect(),
             stride: if batch.per_element { batch.law.info.constants.len() } else { 0 },
             count: batch.law.info.constants.len(),
@@ -56,29 +49,32 @@ impl<R: Precision> CpuBatch<R> {
         }
     }
 
-    fn view(&self) -> Batch<'_, R> {
-        Batch {
-            nodes: &self.nodes,
-            rest: &self.rest,
-            constants: &self.constants,
+    /// The elements in a range.
+    fn part(&self, elements: std::ops::Range<usize>) -> Part<'_, R> {
+        let (nodes, points) = (self.kernels.nodes(), self.kernels.points());
+        Part {
+            nodes: &self.nodes[elements.start * nodes..elements.end * nodes],
+            rest: &self.rest[elements.start * points..elements.end * points],
+            constants: &self.constants[elements.start * self.stride..],
             stride: self.stride,
             count: self.count,
         }
     }
 
-    /// Runs a kernel over chunks of the batch; the lowest element outside the law's domain is the error.
+    /// Runs a kernel over chunks of the batch, each with its part of `out` (`each` entries an element); the lowest element
+    /// outside the law's domain is the error.
     fn run<T: Send>(
         &self,
         out: &mut [T],
-        kernel: impl Fn(&Batch<R>, &mut [T]) -> Option<usize> + Sync,
+        each: usize,
+        kernel: impl Fn(&Part<R>, &mut [T]) -> Option<usize> + Sync,
     ) -> Result<(), LeftDomain> {
         let outside = out
-            .par_chunks_mut(CHUNK)
+            .par_chunks_mut(CHUNK * each)
             .enumerate()
             .filter_map(|(k, out)| {
                 let start = k * CHUNK;
-                let batch = self.view().range(start..start + out.len());
-                kernel(&batch, out).map(|e| start + e)
+                kernel(&self.part(start..start + out.len() / each), out).map(|e| start + e)
             })
             .min();
         match outside {
@@ -95,9 +91,12 @@ impl<R: Precision> CpuBatch<R> {
 /// All elements of a body.
 pub struct CpuField<R: Precision> {
     batches: Vec<CpuBatch<R>>,
-    slots: Vec<Slots<R>>,
-    /// Which slots belong to each node; elements count batch after batch.
+    /// A partial force for each node of each element, batch after batch.
+    slots: Vec<[R; 3]>,
+    /// Which slots belong to each node.
     incidence: Incidence,
+    /// How many elements there are.
+    elements: usize,
     /// The displacement at which the tangent is taken.
     state: Vec<[R; 3]>,
 }
@@ -106,10 +105,11 @@ impl<R: Precision> CpuField<R> {
     /// The elements of a body, in batches.
     pub fn new(body: &Body) -> Self {
         let batches: Vec<CpuBatch<R>> = body.batches.iter().map(|b| CpuBatch::new(body, b)).collect();
-        let elements = batches.iter().flat_map(|b| &b.nodes).map(|nodes| nodes.map(|n| n as usize));
-        let incidence = Incidence::of_elements(body.masses.len(), elements);
+        let slots = batches.iter().flat_map(|b| &b.nodes).map(|n| *n as usize);
+        let incidence = Incidence::of_slots(body.masses.len(), slots);
         Self {
-            slots: vec![[[R::default(); 3]; 4]; incidence.slots().len() / 4],
+            slots: vec![[R::default(); 3]; incidence.slots().len()],
+            elements: body.elements.len(),
             batches,
             incidence,
             state: vec![[R::default(); 3]; body.masses.len()],
@@ -119,46 +119,37 @@ impl<R: Precision> CpuField<R> {
     /// Pass 1: every batch into its slots.
     fn elements(
         &mut self,
-        kernel: impl Fn(&BatchKernels<R>, &Batch<R>, &mut [Slots<R>]) -> Option<usize> + Sync,
+        kernel: impl Fn(&Kernels<R>, &Part<R>, &mut [[R; 3]]) -> Option<usize> + Sync,
     ) -> Result<(), LeftDomain> {
         let mut rest = self.slots.as_mut_slice();
         let mut result = Ok(());
         for batch in &self.batches {
             let (slots, others) = rest.split_at_mut(batch.nodes.len());
             rest = others;
-            let done = batch.run(slots, |view, out| kernel(&batch.kernels, view, out));
+            let done = batch.run(slots, batch.kernels.nodes(), |part, out| kernel(&batch.kernels, part, out));
             result = result.and(done);
         }
         result
     }
 
-    /// Pass 1 of damping: every batch into its slots, 0 where a law has none.
-    fn damping(&mut self, kernel: impl Fn(&DampingKernels<R>, &Batch<R>, &mut [Slots<R>]) + Sync) {
-        let mut rest = self.slots.as_mut_slice();
-        for batch in &self.batches {
-            let (slots, others) = rest.split_at_mut(batch.nodes.len());
-            rest = others;
-            let Some(kernels) = &batch.damping else {
-                slots.fill([[R::default(); 3]; 4]);
-                continue;
-            };
-            let done = batch.run(slots, |view, out| {
-                kernel(kernels, view, out);
-                None
-            });
-            debug_assert!(done.is_ok(), "damping reports no domain");
-        }
+    /// Pass 1 of what reports no domain.
+    fn everywhere(&mut self, kernel: impl Fn(&Kernels<R>, &Part<R>, &mut [[R; 3]]) + Sync) {
+        let done = self.elements(|kernels, part, out| {
+            kernel(kernels, part, out);
+            None
+        });
+        debug_assert!(done.is_ok(), "differentials and damping report no domain");
     }
 
     /// Pass 2: y += factor times the sum of each node's slots.
     fn nodes(&self, factor: R, y: &mut [[R; 3]]) {
-        let flat = self.slots.as_flattened();
+        let slots = &self.slots;
         y.par_chunks_mut(CHUNK).enumerate().for_each(|(k, y)| {
             for (i, y) in y.iter_mut().enumerate() {
                 let node = k * CHUNK + i;
                 let mut sum = [R::default(); 3];
                 for &slot in self.incidence.of(NodeId(node as u32)) {
-                    let partial = flat[slot as usize];
+                    let partial = slots[slot as usize];
                     for c in 0..3 {
                         sum[c] = sum[c] + partial[c];
                     }
@@ -173,10 +164,10 @@ impl<R: Precision> CpuField<R> {
 
 impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
     fn element_energies(&mut self, _: &CpuBackend<R>, u: &Vec<[R; 3]>) -> Result<Vec<f64>, LeftDomain> {
-        let mut energies = vec![0.0; self.slots.len()];
+        let mut energies = vec![0.0; self.elements];
         for batch in &self.batches {
-            let mut out = vec![R::default(); batch.nodes.len()];
-            batch.run(&mut out, |view, out| (batch.kernels.energy)(view, u, out))?;
+            let mut out = vec![R::default(); batch.elements.len()];
+            batch.run(&mut out, 1, |part, out| batch.kernels.energy(part, u, out))?;
             for (&e, w) in batch.elements.iter().zip(out) {
                 energies[e as usize] = w.to_f64();
             }
@@ -185,12 +176,12 @@ impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
     }
 
     fn cauchy(&mut self, _: &CpuBackend<R>, u: &Vec<[R; 3]>) -> Vec<[f64; 9]> {
-        let mut stresses = vec![[0.0; 9]; self.slots.len()];
+        let mut stresses = vec![[0.0; 9]; self.elements];
         for batch in &self.batches {
-            let mut out = vec![[R::default(); 9]; batch.nodes.len()];
+            let mut out = vec![[R::default(); 9]; batch.elements.len()];
             // The kernel cannot fail: outside the domain its values are not used.
-            let _ = batch.run(&mut out, |view, out| {
-                (batch.kernels.cauchy)(view, u, out);
+            let _ = batch.run(&mut out, 1, |part, out| {
+                batch.kernels.cauchy(part, u, out);
                 None
             });
             for (&e, s) in batch.elements.iter().zip(out) {
@@ -201,7 +192,7 @@ impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
     }
 
     fn add_force(&mut self, _: &CpuBackend<R>, u: &Vec<[R; 3]>, f: &mut Vec<[R; 3]>) -> Result<(), LeftDomain> {
-        self.elements(|kernels, batch, out| (kernels.force)(batch, u, out))?;
+        self.elements(|kernels, part, out| kernels.force(part, u, out))?;
         self.nodes(R::from_f64(1.0), f);
         Ok(())
     }
@@ -230,22 +221,17 @@ impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
         factor: f64,
         df: &mut Vec<[R; 3]>,
     ) {
-        let done = self.elements(|kernels, batch, out| {
-            (kernels.dforce)(batch, u, du, out);
-            None
-        });
-        debug_assert!(done.is_ok(), "a differential reports no domain");
+        self.everywhere(|kernels, part, out| kernels.dforce(part, u, du, out));
         self.nodes(R::from_f64(factor), df);
     }
 
     fn add_diagonal_at(&mut self, _: &CpuBackend<R>, u: &Vec<[R; 3]>, factor: f64, d: &mut Vec<[R; 3]>) {
-        let done = self.elements(|kernels, batch, out| (kernels.diagonal)(batch, u, out));
-        debug_assert!(done.is_ok(), "a diagonal reports no domain");
+        self.everywhere(|kernels, part, out| kernels.diagonal(part, u, out));
         self.nodes(R::from_f64(factor), d);
     }
 
     fn add_damping(&mut self, _: &CpuBackend<R>, [u, v]: [&Vec<[R; 3]>; 2], factor: f64, f: &mut Vec<[R; 3]>) {
-        self.damping(|kernels, batch, out| (kernels.damping)(batch, u, v, out));
+        self.everywhere(|kernels, part, out| kernels.damping(part, [u, v], out));
         self.nodes(R::from_f64(factor), f);
     }
 
@@ -257,12 +243,12 @@ impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
         factor: f64,
         df: &mut Vec<[R; 3]>,
     ) {
-        self.damping(|kernels, batch, out| (kernels.ddamping)(batch, u, v, dv, out));
+        self.everywhere(|kernels, part, out| kernels.ddamping(part, [u, v, dv], out));
         self.nodes(R::from_f64(factor), df);
     }
 
     fn add_damping_diagonal(&mut self, _: &CpuBackend<R>, [u, v]: [&Vec<[R; 3]>; 2], factor: f64, d: &mut Vec<[R; 3]>) {
-        self.damping(|kernels, batch, out| (kernels.diagonal)(batch, u, v, out));
+        self.everywhere(|kernels, part, out| kernels.damping_diagonal(part, [u, v], out));
         self.nodes(R::from_f64(factor), d);
     }
 

@@ -1,15 +1,18 @@
 //! The CPU backend: vectors in memory, sums in fixed blocks, elements on all cores.
 
 mod field;
+mod kernels;
 mod vectors;
 
 pub use field::CpuField;
+pub use kernels::{Kernels, Part};
 pub use vectors::CpuBackend;
 
-use tensormass_kernels::{BatchKernels, DampingKernels, LawEntry, Real};
+use tensormass_kernels::composed::Entry;
+use tensormass_kernels::{BatchKernels, DampingKernels, LawEntry};
 
 /// A precision of the CPU backend.
-pub trait Precision: Real + Default + std::iter::Sum {
+pub trait Precision: Entry + Default + std::iter::Sum {
     /// Unit round-off.
     const EPSILON: f64;
     /// The law's kernels in this precision.

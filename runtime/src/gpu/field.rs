@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use tensormass_kernels::LawEntry;
-use tensormass_kernels::generated::tetrahedron_p1::{NODE_PRODUCT, NODE_SUM};
+use tensormass_kernels::generated::{NODE_PRODUCT, NODE_SUM};
 use tensormass_kernels::shader::{Binding, Shader};
 
 use crate::backend::{Backend, ForceField, LeftDomain, Operator};
@@ -87,8 +87,11 @@ impl GpuField {
     /// The elements of a body, in pages.
     ///
     /// # Errors
-    /// A buffer is larger than the device can bind, or the device has failed.
+    /// An element has no kernels here, a buffer is larger than the device can bind, or the device has failed.
     pub fn new(backend: &GpuBackend, body: &Body) -> Result<Self, DeviceError> {
+        if let Some(other) = body.batches.iter().find(|batch| !batch.element.info.is_linear_simplex) {
+            return Err(DeviceError::Element { element: other.element.info.name });
+        }
         let recorder = Rc::clone(backend.recorder());
         let options = backend.options();
         let limit = recorder.gpu().limits().storage_binding_bytes;
@@ -334,11 +337,17 @@ fn paged<'a>(batches: impl Iterator<Item = &'a LawBatch>, limit: u64) -> Vec<Vec
     pages
 }
 
+/// The nodes of a linear tetrahedron.
+fn four(nodes: &[u32]) -> [u32; 4] {
+    std::array::from_fn(|a| nodes[a])
+}
+
 impl Page {
     fn new(recorder: &Recorder, body: &Body, parts: &[Part]) -> Result<Self, DeviceError> {
         let numbers = |(batch, part): &Part| batch.elements[part.clone()].to_vec();
-        let all = parts.iter().flat_map(numbers).map(|e| body.elements[e as usize].map(|n| n as usize));
-        let incidence = Incidence::of_elements(body.masses.len(), all);
+        let all = parts.iter().flat_map(numbers).map(|e| four(&body.elements[e as usize]).map(|n| n as usize));
+        let all = all.collect::<Vec<_>>().into_flattened();
+        let incidence = Incidence::of_slots(body.masses.len(), all.iter().copied());
         let mut offsets = vec![0_u32];
         let mut slot_index: Vec<[u32; 4]> = vec![[0; 4]; incidence.slots().len() / 4];
         for node in 0..body.masses.len() {
@@ -379,12 +388,12 @@ impl Range {
             batch.constants.as_slice()
         };
         let elements = batch.elements[part].to_vec();
-        let nodes: Vec<[u32; 4]> = elements.iter().map(|&e| body.elements[e as usize]).collect();
+        let nodes: Vec<[u32; 4]> = elements.iter().map(|&e| four(&body.elements[e as usize])).collect();
         let row = |k: usize| {
             elements.iter().map(move |&e| {
-                let r = &body.rest[e as usize];
-                let g = &r.shape_gradients[3 * k..3 * k + 3];
-                [g[0] as f32, g[1] as f32, g[2] as f32, if k == 0 { r.volume as f32 } else { 0.0 }]
+                let r = &body.rest[e as usize][0];
+                let g = &r.inverse_jacobian[3 * k..3 * k + 3];
+                [g[0] as f32, g[1] as f32, g[2] as f32, if k == 0 { r.weight as f32 } else { 0.0 }]
             })
         };
         let rest: Vec<[f32; 4]> = (0..3).flat_map(row).collect();

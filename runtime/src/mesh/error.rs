@@ -1,6 +1,6 @@
 //! What can be wrong with a mesh, and what to do about it.
 
-use super::tet_mesh::{ElementId, NodeId};
+use super::topology::{ElementId, NodeId};
 use std::fmt;
 
 /// The kind of a mesh group, for messages.
@@ -10,7 +10,7 @@ pub enum GroupKind {
     Node,
     /// A set of elements.
     Element,
-    /// A set of triangles.
+    /// A set of faces.
     Face,
 }
 
@@ -30,7 +30,7 @@ pub enum MeshError {
     /// There is nothing to simulate.
     #[error("the mesh has no elements; give at least one tetrahedron (a surface mesh has none: fill it first)")]
     NoElements,
-    /// A slot `4 * e + a` would not fit in a `u32`.
+    /// A slot would not fit in a `u32`.
     #[error("the mesh has {elements} elements, more than the {limit} that can be numbered; use a coarser mesh")]
     TooManyElements {
         /// Elements asked for.
@@ -69,7 +69,7 @@ pub enum MeshError {
     },
     /// An element names one node twice.
     #[error(
-        "{} a node twice, first is element {element} with nodes {}; a tetrahedron needs four different nodes",
+        "{} a node twice, first is element {element} with nodes {}; an element needs different nodes",
         counted(*count, "element names", "elements name"), list(nodes)
     )]
     RepeatedNode {
@@ -78,7 +78,7 @@ pub enum MeshError {
         /// The first of them.
         element: ElementId,
         /// Its nodes.
-        nodes: [NodeId; 4],
+        nodes: Vec<NodeId>,
     },
     /// An element is flat: its volume is below 1e-14 of its longest edge cubed.
     #[error(
@@ -94,7 +94,41 @@ pub enum MeshError {
         /// Its signed volume, m3.
         volume: f64,
         /// Its nodes.
-        nodes: [NodeId; 4],
+        nodes: Vec<NodeId>,
+    },
+    /// The map of an element from its reference coordinates folds: det J has both signs.
+    #[error(
+        "{} folded (det J has both signs), first is element {element} with nodes {}; move its nodes, or check their order",
+        counted(*count, "element is", "elements are"), list(nodes)
+    )]
+    Folded {
+        /// Culprits.
+        count: usize,
+        /// The first of them.
+        element: ElementId,
+        /// Its nodes.
+        nodes: Vec<NodeId>,
+    },
+    /// Plane elements beside solid ones.
+    #[error("the mesh has plane and solid elements ({first} and {second}); give one or the other")]
+    MixedDimensions {
+        /// An element of one dimension.
+        first: &'static str,
+        /// One of another.
+        second: &'static str,
+    },
+    /// A plane body that is not in the plane z = 0.
+    #[error(
+        "{} outside the plane z = 0, first is node {node} at z = {z}; plane elements need z = 0",
+        counted(*count, "node is", "nodes are")
+    )]
+    OutOfPlane {
+        /// Culprits.
+        count: usize,
+        /// The first of them.
+        node: NodeId,
+        /// Its z, m.
+        z: f64,
     },
     /// An element's node order gives a negative volume.
     #[error(
@@ -110,9 +144,9 @@ pub enum MeshError {
         /// Its signed volume, m3.
         volume: f64,
         /// Its nodes.
-        nodes: [NodeId; 4],
+        nodes: Vec<NodeId>,
     },
-    /// Two elements have the same four nodes.
+    /// Two elements have the same nodes.
     #[error(
         "{} the nodes of an earlier one, first is element {element}, which repeats element {earlier}; remove one of them",
         counted(*count, "element has", "elements have")
@@ -150,11 +184,11 @@ pub enum MeshError {
         /// How many there are.
         len: usize,
     },
-    /// A triangle of a face group is no face of any element.
+    /// A face of a face group is no face of any element.
     #[error(
         "{} of face group `{name}` {} of any element, first is ({}); \
-         take faces whose three nodes belong to one element, or remove the group",
-        counted(*count, "triangle", "triangles"), if *count == 1 { "is not a face" } else { "are not faces" }, list(face)
+         take faces whose nodes are those of one face of an element, or remove the group",
+        counted(*count, "face", "faces"), if *count == 1 { "is not a face" } else { "are not faces" }, list(face)
     )]
     FaceNotInMesh {
         /// The group.
@@ -162,7 +196,13 @@ pub enum MeshError {
         /// Culprits.
         count: usize,
         /// The first of them.
-        face: [NodeId; 3],
+        face: Vec<NodeId>,
+    },
+    /// A beam of elements that make no cell.
+    #[error("a beam cannot be made of `{element}`; take an element that is a tetrahedron, a hexahedron or a prism")]
+    BeamElement {
+        /// The element.
+        element: &'static str,
     },
     /// A beam with no cells along an axis.
     #[error("the beam has no cells along {axis}; give at least 1")]
@@ -188,7 +228,7 @@ pub enum MeshError {
     },
     /// A beam with more elements (or nodes) than can be numbered.
     #[error(
-        "a beam of {} x {} x {} cells has more than {limit} tetrahedra, the most that can be numbered; use fewer cells",
+        "a beam of {} x {} x {} cells has more elements than the {limit} that can be numbered; use fewer cells",
         cells[0], cells[1], cells[2]
     )]
     BeamTooLarge {
@@ -206,14 +246,18 @@ impl MeshError {
             MeshError::NodeOutOfRange { element, .. }
             | MeshError::RepeatedNode { element, .. }
             | MeshError::Degenerate { element, .. }
+            | MeshError::Folded { element, .. }
             | MeshError::Inverted { element, .. }
             | MeshError::Duplicate { element, .. } => Some(element),
             MeshError::NoElements
             | MeshError::TooManyElements { .. }
+            | MeshError::MixedDimensions { .. }
+            | MeshError::OutOfPlane { .. }
             | MeshError::NotFinite { .. }
             | MeshError::UnreferencedNodes { .. }
             | MeshError::GroupIndex { .. }
             | MeshError::FaceNotInMesh { .. }
+            | MeshError::BeamElement { .. }
             | MeshError::BeamCells { .. }
             | MeshError::BeamSize { .. }
             | MeshError::BeamOrigin { .. }
@@ -224,9 +268,13 @@ impl MeshError {
     /// The first culprit if it is a node: readers turn it into a line number.
     pub fn node(&self) -> Option<NodeId> {
         match *self {
-            MeshError::NotFinite { node, .. } | MeshError::UnreferencedNodes { node, .. } => Some(node),
+            MeshError::NotFinite { node, .. }
+            | MeshError::OutOfPlane { node, .. }
+            | MeshError::UnreferencedNodes { node, .. } => Some(node),
             MeshError::NoElements
             | MeshError::TooManyElements { .. }
+            | MeshError::MixedDimensions { .. }
+            | MeshError::Folded { .. }
             | MeshError::NodeOutOfRange { .. }
             | MeshError::RepeatedNode { .. }
             | MeshError::Degenerate { .. }
@@ -234,6 +282,7 @@ impl MeshError {
             | MeshError::Duplicate { .. }
             | MeshError::GroupIndex { .. }
             | MeshError::FaceNotInMesh { .. }
+            | MeshError::BeamElement { .. }
             | MeshError::BeamCells { .. }
             | MeshError::BeamSize { .. }
             | MeshError::BeamOrigin { .. }

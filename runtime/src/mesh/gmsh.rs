@@ -11,16 +11,17 @@ mod v2;
 mod v4;
 
 use super::error::MeshError;
-use super::tet_mesh::{Orientation, TetMesh};
+use super::topology::{Mesh, Orientation};
 use lines::{Lines, Problem};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use tensormass_kernels::ElementEntry;
 
 /// A mesh as read from a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeshFile {
     /// The mesh.
-    pub mesh: TetMesh,
+    pub mesh: Mesh,
     /// What was left out or named by the reader; nothing that changes the simulated body.
     pub warnings: Vec<String>,
 }
@@ -64,8 +65,8 @@ pub enum MeshFileError {
 ///
 /// # Errors
 /// [`MeshFileError`], with a line number: the file cannot be read, is binary, is of another version, is truncated or
-/// garbled, has elements other than 4-node tetrahedra (and the triangles, lines and points that bound them), or its
-/// mesh is not valid.
+/// garbled, has elements that the build has not (and the faces, lines and points that bound them), or its mesh is not
+/// valid.
 pub fn read(path: &Path, orientation: Orientation) -> Result<MeshFile, MeshFileError> {
     let bytes = std::fs::read(path).map_err(|source| MeshFileError::Read { path: path.to_owned(), source })?;
     parse(path, &bytes, orientation)
@@ -83,8 +84,8 @@ pub fn parse(path: &Path, bytes: &[u8], orientation: Orientation) -> Result<Mesh
         remedy: problem.remedy,
     };
     let assembled = assemble::assemble(sections(bytes).map_err(refuse)?).map_err(refuse)?;
-    let (nodes, tets, groups) = (assembled.nodes, assembled.tets, assembled.groups);
-    match TetMesh::with_orientation(nodes, tets, groups, orientation) {
+    let (nodes, blocks, groups) = (assembled.nodes, assembled.blocks, assembled.groups);
+    match Mesh::with_orientation(nodes, blocks, groups, orientation) {
         Ok(mesh) => Ok(MeshFile { mesh, warnings: assembled.warnings }),
         Err(error) => {
             let line = assembled.source.line_of(&error);
@@ -107,10 +108,12 @@ struct RawNode {
 }
 
 /// An element of any dimension as the file has it.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct RawElement {
-    /// Node tags; the first `dimension + 1` count.
-    nodes: [u64; 4],
+    /// What it is; `None` is a point.
+    kind: Option<&'static ElementEntry>,
+    /// Node tags, in Gmsh's order.
+    nodes: Vec<u64>,
     /// Its physical groups, by their place in [`Sets::list`].
     set: u32,
     line: u32,
@@ -144,7 +147,7 @@ impl Sets {
 #[derive(Default)]
 struct Raw {
     nodes: Vec<RawNode>,
-    /// By dimension: points, lines, triangles, tetrahedra.
+    /// By dimension: points, lines, faces, solids.
     elements: [Vec<RawElement>; 4],
     sets: Sets,
     /// Names of physical groups, by dimension and tag.

@@ -24,7 +24,7 @@ impl ShapeGradients {
 /// columns are the edges from corner 0.
 ///
 /// Edges are differences of positions, taken first: far from the origin nothing more is lost than the positions
-/// themselves have lost. A flat tetrahedron gives infinite or NaN gradients; a [`TetMesh`](super::TetMesh) has none.
+/// themselves have lost. A flat tetrahedron gives infinite or NaN gradients; a [`Mesh`](super::Mesh) has none.
 pub fn shape_gradients(corners: &[[f64; 3]; 4]) -> ShapeGradients {
     let [e1, e2, e3] = edges(corners);
     let det = determinant(&[e1, e2, e3]);

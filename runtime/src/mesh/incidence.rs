@@ -1,8 +1,9 @@
 //! Incidence: which slots (element, local node) hold the partial forces of each node.
 
-use super::tet_mesh::{NodeId, TetMesh};
+use super::topology::{Mesh, NodeId};
 
-/// For each node, the slots `4 * e + a` in which it is node `a` of element `e`, in compressed rows.
+/// For each node, the slots in which it is a node of an element, in compressed rows; slots count the nodes of one element
+/// after the other.
 ///
 /// Pass 1 of the two-pass assembly (Faure et al. 2012, algorithm 1) writes one partial force a slot; pass 2 sums the
 /// slots of each node in increasing order, hence always in the same order. Every slot occurs once, so no slot is ever
@@ -14,18 +15,19 @@ pub struct Incidence {
 }
 
 impl Incidence {
-    /// The incidence of a mesh: 16 bytes an element and 4 a node.
-    pub fn new(mesh: &TetMesh) -> Incidence {
-        Self::of_elements(mesh.nodes().len(), mesh.tets().iter().map(|t| t.map(NodeId::index)))
+    /// The incidence of a mesh: 4 bytes a slot and 4 a node.
+    pub fn new(mesh: &Mesh) -> Incidence {
+        let slots = mesh.blocks().iter().flat_map(|block| block.nodes.iter().map(|node| node.index()));
+        Self::of_slots(mesh.nodes().len(), slots)
     }
 
-    /// The incidence of elements in an order of their own, over this many nodes: slots count in that order.
+    /// The incidence of slots in an order of their own, each given by its node, over this many nodes.
     ///
     /// # Panics
-    /// If an element names a node beyond `nodes`.
-    pub fn of_elements(nodes: usize, elements: impl Iterator<Item = [usize; 4]> + Clone) -> Incidence {
+    /// If a slot names a node beyond `nodes`.
+    pub fn of_slots(nodes: usize, slots_of: impl Iterator<Item = usize> + Clone) -> Incidence {
         let mut offsets = vec![0_u32; nodes + 1];
-        for node in elements.clone().flatten() {
+        for node in slots_of.clone() {
             offsets[node + 1] += 1;
         }
         for node in 0..nodes {
@@ -33,9 +35,9 @@ impl Incidence {
         }
         let mut slots = vec![0_u32; offsets[nodes] as usize];
         let mut next = offsets.clone();
-        for (slot, node) in elements.flatten().enumerate() {
+        for (slot, node) in slots_of.enumerate() {
             let place = &mut next[node];
-            // `as u32` is exact: a mesh has at most MAX_ELEMENTS elements.
+            // `as u32` is exact: a mesh has at most MAX_SLOTS slots.
             slots[*place as usize] = slot as u32;
             *place += 1;
         }
@@ -47,7 +49,7 @@ impl Incidence {
         &self.offsets
     }
 
-    /// The slots of all nodes, node after node; four entries an element.
+    /// The slots of all nodes, node after node.
     pub fn slots(&self) -> &[u32] {
         &self.slots
     }

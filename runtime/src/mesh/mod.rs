@@ -1,17 +1,19 @@
-//! Meshes: tetrahedra, their groups, incidence, shape gradients and quality, and where they come from.
+//! Meshes: elements of any kinds, their groups, incidence, maps and quality, and where they come from.
 
 mod beam;
 mod error;
 pub mod gmsh;
 mod gradients;
 mod incidence;
+mod map;
 mod quality;
-mod tet_mesh;
+mod topology;
 mod validate;
 
-pub use beam::beam;
+pub use beam::{beam, beam_of};
 pub use error::{GroupKind, MeshError};
 pub use gradients::{ShapeGradients, shape_gradients};
 pub use incidence::Incidence;
+pub use map::integrals;
 pub use quality::Quality;
-pub use tet_mesh::{ElementId, Groups, NodeId, Orientation, TetMesh};
+pub use topology::{Block, ElementId, FaceId, Groups, Mesh, NodeId, Orientation};

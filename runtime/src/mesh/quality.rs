@@ -1,7 +1,11 @@
 //! Mesh quality: how small and how distorted the elements are.
+//!
+//! A tetrahedron is measured between its corners, any other element by J at its quadrature points, as the parallelepiped
+//! that its reference shape becomes there.
 
-use super::gradients::{cross, dot, edges, norm, sub};
-use super::tet_mesh::{ElementId, FACES, TetMesh};
+use super::gradients::{cross, dot, edges, norm, six_volumes, sub};
+use super::map;
+use super::topology::{ElementId, Mesh};
 use std::fmt;
 
 /// Extremes over the elements of a mesh. Its `Display` takes two lines.
@@ -17,15 +21,19 @@ pub struct Quality {
     pub min_dihedral: f64,
     /// Greatest angle between two faces, degrees.
     pub max_dihedral: f64,
-    /// Least radius ratio: 3 x inscribed / circumscribed radius; 1 for a regular tetrahedron, 0 for a flat one.
+    /// Least radius ratio: 3 x inscribed / circumscribed radius; 1 for a regular tetrahedron, 0 for a flat one. Of other
+    /// elements det J over the product of the lengths of its columns: 1 for a box.
     pub worst_radius_ratio: f64,
     /// The (first) element with that radius ratio.
     pub worst_element: ElementId,
 }
 
+/// The faces of a tetrahedron by its corners; face `a` is opposite to corner `a`, its normal points outward.
+const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+
 impl Quality {
     /// The quality of a mesh.
-    pub fn of(mesh: &TetMesh) -> Quality {
+    pub fn of(mesh: &Mesh) -> Quality {
         let mut quality = Quality {
             min_volume: f64::INFINITY,
             max_volume: 0.0,
@@ -36,14 +44,53 @@ impl Quality {
             worst_element: ElementId(0),
         };
         for element in mesh.elements() {
-            quality.include(element, mesh.volume(element), &mesh.corners(element));
+            let info = mesh.kind(element).info;
+            let positions = mesh.positions(mesh.element_nodes(element));
+            let volume = mesh.volume(element);
+            quality.min_volume = quality.min_volume.min(volume);
+            quality.max_volume = quality.max_volume.max(volume);
+            if info.shape == "tetrahedron" {
+                // Its corners come first.
+                quality.tetrahedron(element, &std::array::from_fn(|a| positions[a]));
+                continue;
+            }
+            for point in info.points {
+                quality.parallelepiped(element, map::jacobian(info, point, &positions), info.dimension);
+            }
         }
         quality
     }
 
-    fn include(&mut self, element: ElementId, volume: f64, corners: &[[f64; 3]; 4]) {
-        self.min_volume = self.min_volume.min(volume);
-        self.max_volume = self.max_volume.max(volume);
+    fn distorted(&mut self, element: ElementId, ratio: f64) {
+        if ratio < self.worst_radius_ratio {
+            self.worst_radius_ratio = ratio;
+            self.worst_element = element;
+        }
+    }
+
+    fn angle(&mut self, degrees: f64) {
+        self.min_dihedral = self.min_dihedral.min(degrees);
+        self.max_dihedral = self.max_dihedral.max(degrees);
+    }
+
+    /// What the box from -1 to 1 becomes under J.
+    fn parallelepiped(&mut self, element: ElementId, columns: [[f64; 3]; 3], dimension: usize) {
+        let [a, b, c] = columns;
+        let normals = [cross(b, c), cross(c, a), cross(a, b)];
+        let det = dot(a, normals[0]);
+        for (k, normal) in normals.iter().enumerate().take(dimension) {
+            self.min_altitude = self.min_altitude.min(2.0 * det / norm(*normal));
+            for other in &normals[..k] {
+                let angle = norm(cross(*normal, *other)).atan2(dot(*normal, *other)).to_degrees();
+                self.angle(angle);
+                self.angle(180.0 - angle);
+            }
+        }
+        self.distorted(element, det / columns.iter().map(|column| norm(*column)).product::<f64>());
+    }
+
+    fn tetrahedron(&mut self, element: ElementId, corners: &[[f64; 3]; 4]) {
+        let volume = six_volumes(corners) / 6.0;
 
         // Outward normals with the length of twice the face's area.
         let normals = FACES.map(|[a, b, c]| cross(sub(corners[b], corners[a]), sub(corners[c], corners[a])));
@@ -55,8 +102,7 @@ impl Quality {
             for b in a + 1..4 {
                 // atan2 keeps its digits at angles near 0 and 180 degrees, where acos loses half of them.
                 let angle = norm(cross(normals[a], normals[b])).atan2(-dot(normals[a], normals[b])).to_degrees();
-                self.min_dihedral = self.min_dihedral.min(angle);
-                self.max_dihedral = self.max_dihedral.max(angle);
+                self.angle(angle);
             }
         }
 
@@ -66,10 +112,7 @@ impl Quality {
         let circumradius = norm([0, 1, 2].map(|c| q1 * c1[c] + q2 * c2[c] + q3 * c3[c])) / (12.0 * volume);
         let inradius = 3.0 * volume / areas.iter().sum::<f64>();
         let ratio = 3.0 * inradius / circumradius;
-        if ratio < self.worst_radius_ratio {
-            self.worst_radius_ratio = ratio;
-            self.worst_element = element;
-        }
+        self.distorted(element, ratio);
     }
 }
 

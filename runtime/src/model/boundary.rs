@@ -5,14 +5,14 @@ use std::collections::BTreeMap;
 use super::place::Places;
 use crate::body::Constraint;
 use crate::history::History;
-use crate::mesh::TetMesh;
+use crate::mesh::Mesh;
 use crate::scale::Scale;
 use crate::scene::{Axis, Boundary, Scene, SceneError};
 
 /// The constrained components, ascending, and the histories that they follow; in scaled units.
 pub fn constraints(
     scene: &Scene,
-    mesh: &TetMesh,
+    mesh: &Mesh,
     places: &Places,
     scale: &Scale,
 ) -> Result<(Vec<Constraint>, Vec<History>), SceneError> {
@@ -45,6 +45,17 @@ pub fn constraints(
                     _ => {}
                 }
             }
+        }
+    }
+    // Strain is plane: elements of two dimensions resist nothing along z.
+    if mesh.blocks()[0].info().dimension == 2 {
+        let still = History::constant(0.0);
+        let motion = motions.iter().position(|m| *m == still).unwrap_or_else(|| {
+            motions.push(still);
+            motions.len() - 1
+        });
+        for node in 0..mesh.nodes().len() as u32 {
+            found.entry((node, 2)).or_insert((motion, 0));
         }
     }
     let constraints =

@@ -1,27 +1,29 @@
 //! Loads as nodal forces: weight, tractions on boundary faces, forces at nodes.
 
 use super::place::Places;
-use crate::body::Load;
+use crate::body::{Load, Rows};
 use crate::history::History;
-use crate::mesh::TetMesh;
+use tensormass_kernels::RestPoint;
+
+use crate::mesh::{self, Mesh};
 use crate::scale::Scale;
 use crate::scene::{self, Scene, SceneError};
 
-/// The loads of a scene, in scaled units.
+/// The loads of a scene, in scaled units; `weights` as [`weights`] gives them.
 pub fn loads(
     scene: &Scene,
-    mesh: &TetMesh,
+    mesh: &Mesh,
     places: &Places,
     scale: &Scale,
-    masses: &[f64],
+    weights: &[f64],
 ) -> Result<Vec<Load>, SceneError> {
     let mut loads = Vec::new();
     for (i, load) in scene.load.iter().enumerate() {
-        let mut forces = vec![[0.0; 3]; masses.len()];
+        let mut forces = vec![[0.0; 3]; weights.len()];
         let ramp = match load {
             scene::Load::Gravity { acceleration, ramp } => {
                 let g = acceleration.map(|a| a / scale.acceleration());
-                for (f, m) in forces.iter_mut().zip(masses) {
+                for (f, m) in forces.iter_mut().zip(weights) {
                     *f = g.map(|g| m * g);
                 }
                 ramp
@@ -30,10 +32,13 @@ pub fn loads(
                 let faces = places.faces(scene, &format!("load.{i}.faces"), faces)?;
                 let traction = value.map(|t| t / scale.stress);
                 for face in faces {
-                    let area = area(face.map(|n| mesh.nodes()[n.index()])) / (scale.length * scale.length);
-                    for n in face {
+                    let nodes = mesh.face_nodes(face);
+                    let unit = scale.length.powi(mesh.face_kind(face).dimension as i32);
+                    for (n, integral) in
+                        nodes.iter().zip(mesh::integrals(mesh.face_kind(face), &mesh.positions(&nodes)))
+                    {
                         for c in 0..3 {
-                            forces[n.index()][c] += traction[c] * area / 3.0;
+                            forces[n.index()][c] += traction[c] * integral / unit;
                         }
                     }
                 }
@@ -60,10 +65,18 @@ pub fn loads(
     Ok(loads)
 }
 
-/// The area of a triangle.
-pub fn area(p: [[f64; 3]; 3]) -> f64 {
-    let edge = |a: usize| -> [f64; 3] { std::array::from_fn(|i| p[a][i] - p[0][i]) };
-    let (a, b) = (edge(1), edge(2));
-    let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    0.5 * cross.iter().map(|x| x * x).sum::<f64>().sqrt()
+/// What each node bears of a body force of unit acceleration: the integral of its function times the density. Linear
+/// functions give a quarter of a tetrahedron's mass to each node; of quadratic ones some corners bear a negative part,
+/// other than of a lumped mass.
+pub fn weights(mesh: &Mesh, elements: &Rows<u32>, rest: &Rows<RestPoint<f64>>, masses: &[f64]) -> Vec<f64> {
+    let mut weights = vec![0.0; mesh.nodes().len()];
+    for (e, mass) in mesh.elements().zip(masses) {
+        let (info, points) = (mesh.kind(e).info, &rest[e.index()]);
+        let volume: f64 = points.iter().map(|p| p.weight).sum();
+        for (j, n) in elements[e.index()].iter().enumerate() {
+            let part: f64 = points.iter().zip(info.points).map(|(p, at)| p.weight * at.functions[j]).sum();
+            weights[*n as usize] += mass * part / volume;
+        }
+    }
+    weights
 }

@@ -1,13 +1,13 @@
-//! Materials: which law and which constants each element has, gathered into one batch a law.
+//! Materials: which law and which constants each element has, gathered into one batch a law and kind of element.
 
 use std::collections::BTreeMap;
 
-use tensormass_kernels::{LawEntry, law, laws};
+use tensormass_kernels::{ElementEntry, LawEntry, law, laws};
 
 use super::parameters::{self, Values};
 use super::place::Places;
 use crate::body::LawBatch;
-use crate::mesh::TetMesh;
+use crate::mesh::{ElementId, Mesh};
 use crate::scale::Scale;
 use crate::scene::{Scene, SceneError};
 
@@ -43,8 +43,8 @@ pub struct Assignment {
 }
 
 /// Assigns materials to elements: each element exactly one.
-pub fn assign(scene: &Scene, mesh: &TetMesh, places: &Places) -> Result<Assignment, SceneError> {
-    let count = mesh.tets().len();
+pub fn assign(scene: &Scene, mesh: &Mesh, places: &Places) -> Result<Assignment, SceneError> {
+    let count = mesh.len();
     let mut of_element: Vec<Option<usize>> = vec![None; count];
     let mut entries = Vec::new();
     for (i, material) in scene.material.iter().enumerate() {
@@ -135,19 +135,34 @@ impl Assignment {
         self.entries.iter().map(|e| e.report.clone()).collect()
     }
 
-    /// One batch a law, in the order of the laws' names; constants in scaled units.
-    pub fn batches(&self, scale: &Scale) -> Vec<LawBatch> {
+    /// One batch a law and kind of element, in the order of the laws' names and of the mesh's blocks; constants in scaled
+    /// units.
+    pub fn batches(&self, mesh: &Mesh, scale: &Scale) -> Vec<LawBatch> {
         let mut by_law: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
         for (i, entry) in self.entries.iter().enumerate() {
             by_law.entry(entry.report.law.info.name).or_default().push(i);
         }
-        by_law.into_values().map(|materials| self.batch(&materials, scale)).collect()
+        let mut batches = vec![];
+        for materials in by_law.into_values() {
+            let mut elements: Vec<u32> =
+                materials.iter().flat_map(|&m| self.entries[m].members.iter().copied()).collect();
+            elements.sort_unstable();
+            let kind = |e: &u32| mesh.kind(ElementId(*e));
+            // The elements of a block have ascending numbers.
+            let kinds = elements.chunk_by(|a, b| std::ptr::eq(kind(a), kind(b)));
+            batches.extend(kinds.map(|of_kind| self.batch(&materials, of_kind.to_vec(), kind(&of_kind[0]), scale)));
+        }
+        batches
     }
 
-    fn batch(&self, materials: &[usize], scale: &Scale) -> LawBatch {
+    fn batch(
+        &self,
+        materials: &[usize],
+        elements: Vec<u32>,
+        element: &'static ElementEntry,
+        scale: &Scale,
+    ) -> LawBatch {
         let law = self.entries[materials[0]].report.law;
-        let mut elements: Vec<u32> = materials.iter().flat_map(|&m| self.entries[m].members.iter().copied()).collect();
-        elements.sort_unstable();
         let constants_of = |entry: &Entry, e: u32| {
             let mut row = entry.values.row(e).to_vec();
             let mut k = 0;
@@ -178,6 +193,6 @@ impl Assignment {
                 })
                 .collect()
         };
-        LawBatch { law, elements, constants, per_element: !one }
+        LawBatch { law, element, elements, constants, per_element: !one }
     }
 }

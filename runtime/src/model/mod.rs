@@ -9,14 +9,14 @@ mod material;
 mod parameters;
 pub(crate) mod place;
 
-use tensormass_kernels::batch::RestElement;
+use tensormass_kernels::{ElementEntry, RestPoint};
 
-use crate::body::{self, Body};
+use crate::body::{self, Body, Rows};
 use crate::mesh::gmsh::{self, MeshFileError};
-use crate::mesh::{self, Orientation, Quality, TetMesh};
+use crate::mesh::{self, Mesh, Orientation, Quality};
 use crate::probe::Recorder;
 use crate::scale::Scale;
-use crate::scene::{Mesh, Scene, SceneError};
+use crate::scene::{self, Scene, SceneError};
 
 pub use material::MaterialReport;
 use place::Places;
@@ -36,7 +36,7 @@ pub enum BuildError {
 #[derive(Debug)]
 pub struct Model {
     /// The mesh (m).
-    pub mesh: TetMesh,
+    pub mesh: Mesh,
     /// How small and how distorted its elements are.
     pub quality: Quality,
     /// The body, in scaled units.
@@ -78,19 +78,14 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
     let [low, high] = mesh.bounding_box();
     let diagonal = (0..3).map(|i| (high[i] - low[i]).powi(2)).sum::<f64>().sqrt();
     let scale = Scale::new(diagonal, assignment.stiffness(), assignment.density());
-    let elements: Vec<[u32; 4]> = mesh.tets().iter().map(|t| t.map(|n| n.0)).collect();
-    let mut rest = Vec::with_capacity(elements.len());
-    let mut element_masses = Vec::with_capacity(elements.len());
-    for (e, density) in mesh.elements().zip(assignment.densities()) {
-        let g = mesh.shape_gradients(e);
-        let rows = g.gradients.as_flattened();
-        let volume = g.volume / scale.length.powi(3);
-        rest.push(RestElement { shape_gradients: std::array::from_fn(|k| rows[k] * scale.length), volume });
-        element_masses.push(volume * density / scale.density());
-    }
-    let batches = assignment.batches(&scale);
+    let elements: Rows<u32> = mesh.elements().map(|e| mesh.element_nodes(e).iter().map(|n| n.0)).collect();
+    let rest = scaled_rest(&mesh, scale.length);
+    let densities = assignment.densities().map(|density| density / scale.density());
+    let element_masses: Vec<f64> =
+        rest.iter().zip(densities).map(|(points, d)| points.iter().map(|p| p.weight).sum::<f64>() * d).collect();
+    let batches = assignment.batches(&mesh, &scale);
     let (constraints, motions) = boundary::constraints(scene, &mesh, &places, &scale)?;
-    if constraints.is_empty() && scene.solver.integrator == crate::scene::Integrator::Static {
+    if constraints.is_empty() && scene.solver.integrator == scene::Integrator::Static {
         return Err(SceneError::at(
             scene.locate("solver.integrator"),
             "static equilibrium needs supports, but no displacement is imposed",
@@ -98,8 +93,15 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
         )
         .into());
     }
-    let masses = body::lump(mesh.nodes().len(), &elements, &element_masses);
-    let loads = loads::loads(scene, &mesh, &places, &scale, &masses)?;
+    let each = mesh.elements().zip(elements.iter()).zip(&element_masses);
+    let masses = body::lump(mesh.nodes().len(), each.map(|((e, nodes), mass)| (mesh.kind(e), nodes, *mass)));
+    // In motion a body falls as a whole only where weight and inertia are the same masses; in equilibrium the integrals of
+    // the functions are more accurate.
+    let weights = match scene.solver.integrator {
+        scene::Integrator::Static => loads::weights(&mesh, &elements, &rest, &element_masses),
+        _ => masses.clone(),
+    };
+    let loads = loads::loads(scene, &mesh, &places, &scale, &weights)?;
     let recorder = Recorder::new(scene, &mesh, &places, &constraints)?;
     let velocity = scene.initial.velocity.map(|v| v / scale.velocity());
     let body = Body {
@@ -119,17 +121,32 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
     Ok(Model { materials: assignment.reports(), assignment, quality, mesh, body, scale, recorder, velocity, warnings })
 }
 
-fn load_mesh(scene: &Scene, warnings: &mut Vec<String>) -> Result<TetMesh, BuildError> {
+/// The quadrature points of all elements, in scaled lengths.
+fn scaled_rest(mesh: &Mesh, length: f64) -> Rows<RestPoint<f64>> {
+    let of = |e| {
+        // Powers of two: scaling rounds nothing. Plane bodies are one metre thick.
+        let dimension = mesh.kind(e).info.dimension as i32;
+        let scale = move |p: RestPoint<f64>| RestPoint {
+            inverse_jacobian: p.inverse_jacobian.map(|x| x * length),
+            weight: p.weight / length.powi(dimension),
+        };
+        mesh.rest(e).into_iter().map(scale)
+    };
+    mesh.elements().map(of).collect()
+}
+
+fn load_mesh(scene: &Scene, warnings: &mut Vec<String>) -> Result<Mesh, BuildError> {
     match &scene.mesh {
-        Mesh::Beam { beam } => {
+        scene::Mesh::Beam { beam } => {
             let cells = beam.cells.map(|c| c as usize);
-            mesh::beam(beam.size, cells, beam.origin).map_err(|e| {
+            let element = find_element(scene, &beam.element)?;
+            mesh::beam_of(element, beam.size, cells, beam.origin).map_err(|e| {
                 let text = e.to_string();
                 let (reason, remedy) = text.split_once("; ").unwrap_or((&text, "change the beam's size or cells"));
                 SceneError::at(scene.locate("mesh.beam"), reason, remedy).into()
             })
         }
-        Mesh::File { file, orient, scale } => {
+        scene::Mesh::File { file, orient, scale } => {
             let orientation = if *orient { Orientation::Repair } else { Orientation::Refuse };
             let loaded = gmsh::read(&scene.resolve(file), orientation)?;
             warnings.extend(loaded.warnings);
@@ -137,9 +154,23 @@ fn load_mesh(scene: &Scene, warnings: &mut Vec<String>) -> Result<TetMesh, Build
                 return Ok(loaded.mesh);
             }
             let nodes = loaded.mesh.nodes().iter().map(|p| p.map(|x| x * scale)).collect();
-            let (tets, groups) = (loaded.mesh.tets().to_vec(), loaded.mesh.groups().clone());
-            TetMesh::new(nodes, tets, groups)
+            loaded
+                .mesh
+                .moved(nodes)
                 .map_err(|e| SceneError::at(scene.locate("mesh.scale"), e.to_string(), "choose another scale").into())
         }
     }
+}
+
+/// The element of a generated mesh.
+fn find_element(scene: &Scene, name: &str) -> Result<&'static ElementEntry, SceneError> {
+    tensormass_kernels::element(name).ok_or_else(|| {
+        let solid = tensormass_kernels::elements().iter().filter(|e| e.info.dimension == 3);
+        let names: Vec<&str> = solid.map(|e| e.info.name).collect();
+        SceneError::at(
+            scene.locate("mesh.beam.element"),
+            format!("there is no element \"{name}\""),
+            format!("elements of this build: {}", names.join(", ")),
+        )
+    })
 }

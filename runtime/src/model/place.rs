@@ -1,17 +1,17 @@
 //! Resolves selections on a mesh: nodes, elements and boundary faces, by place or by group.
 
-use crate::mesh::{ElementId, NodeId, TetMesh};
+use crate::mesh::{ElementId, FaceId, Mesh, NodeId};
 use crate::scene::{BoundingBox, Scene, SceneError, Selection, SelectionKind};
 
 /// A mesh with the points that selections test.
 pub struct Places<'a> {
-    mesh: &'a TetMesh,
+    mesh: &'a Mesh,
     bbox: BoundingBox,
 }
 
 impl<'a> Places<'a> {
     /// The points of a mesh.
-    pub fn new(mesh: &'a TetMesh) -> Self {
+    pub fn new(mesh: &'a Mesh) -> Self {
         let [min, max] = mesh.bounding_box();
         Self { mesh, bbox: BoundingBox { min, max } }
     }
@@ -30,9 +30,9 @@ impl<'a> Places<'a> {
         let group =
             |name: &str| self.mesh.element_group(name).map(|g| g.iter().map(|e: &ElementId| e.index()).collect());
         let centroids: Vec<[f64; 3]> = match selection.kind() {
-            SelectionKind::All | SelectionKind::Group(_) => vec![[0.0; 3]; self.mesh.tets().len()],
+            SelectionKind::All | SelectionKind::Group(_) => vec![[0.0; 3]; self.mesh.len()],
             SelectionKind::Box(_) | SelectionKind::Where(_) => {
-                self.mesh.elements().map(|e| centroid(&self.mesh.corners(e))).collect()
+                self.mesh.elements().map(|e| centroid(&self.mesh.positions(self.mesh.element_nodes(e)))).collect()
             }
         };
         let found = selection.select(&centroids, &self.bbox, group);
@@ -42,20 +42,20 @@ impl<'a> Places<'a> {
     }
 
     /// The selected faces of the boundary; at least one.
-    pub fn faces(&self, scene: &Scene, path: &str, selection: &Selection) -> Result<Vec<[NodeId; 3]>, SceneError> {
-        let boundary = self.mesh.boundary_faces();
-        let key = |face: &[NodeId; 3]| {
-            let mut k = *face;
+    pub fn faces(&self, scene: &Scene, path: &str, selection: &Selection) -> Result<Vec<FaceId>, SceneError> {
+        let boundary = self.mesh.boundary();
+        let nodes: Vec<Vec<NodeId>> = boundary.iter().map(|face| self.mesh.face_nodes(*face)).collect();
+        let key = |face: &Vec<NodeId>| {
+            let mut k = face.clone();
             k.sort_unstable();
             k
         };
         let group = |name: &str| {
-            let members: std::collections::BTreeSet<[NodeId; 3]> =
+            let members: std::collections::BTreeSet<Vec<NodeId>> =
                 self.mesh.face_group(name)?.iter().map(key).collect();
-            Some((0..boundary.len()).filter(|&i| members.contains(&key(&boundary[i]))).collect())
+            Some((0..boundary.len()).filter(|&i| members.contains(&key(&nodes[i]))).collect())
         };
-        let at = |n: NodeId| self.mesh.nodes()[n.index()];
-        let centroids: Vec<[f64; 3]> = boundary.iter().map(|f| centroid(&f.map(at))).collect();
+        let centroids: Vec<[f64; 3]> = nodes.iter().map(|of| centroid(&self.mesh.positions(of))).collect();
         let found = selection.select(&centroids, &self.bbox, group);
         let names: Vec<&str> = self.mesh.face_group_names().collect();
         let found = self.some(scene, path, selection, "boundary face", found, &names)?;
@@ -101,6 +101,7 @@ impl<'a> Places<'a> {
     }
 }
 
-fn centroid<const N: usize>(points: &[[f64; 3]; N]) -> [f64; 3] {
-    std::array::from_fn(|i| points.iter().map(|p| p[i]).sum::<f64>() / N as f64)
+/// The mean of the nodes.
+fn centroid(points: &[[f64; 3]]) -> [f64; 3] {
+    std::array::from_fn(|i| points.iter().map(|p| p[i]).sum::<f64>() / points.len() as f64)
 }

@@ -10,4 +10,4 @@ pub use atomic::{OutputError, create_folder, remove_file, write_atomic};
 pub use csv::ProbeTable;
 pub use json::write_json_atomic;
 pub use pvd::PvdWriter;
-pub use vtu::{Field, FieldValues, write_vtu};
+pub use vtu::{Cells, Field, FieldValues, write_vtu};

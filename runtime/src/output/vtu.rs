@@ -1,4 +1,4 @@
-//! VTU frames: tetrahedra with point and cell data, as appended raw blocks compressed by zlib.
+//! VTU frames: cells of any kinds with point and cell data, as appended raw blocks compressed by zlib.
 
 use super::atomic::{OutputError, escape_xml, write_atomic};
 use flate2::{Compression, write::ZlibEncoder};
@@ -42,27 +42,41 @@ impl FieldValues<'_> {
 /// Bytes of a block before compression: large enough for zlib's window (32 KiB), small enough to spread over threads.
 const BLOCK: usize = 256 * 1024;
 
-/// VTK's number for a linear tetrahedron.
-const VTK_TETRA: u8 = 10;
+/// The cells of a mesh.
+#[derive(Debug, Clone, Default)]
+pub struct Cells {
+    /// The points of one cell after the other, in VTK's order.
+    pub points: Vec<u32>,
+    /// Where each cell's points end.
+    pub ends: Vec<i64>,
+    /// VTK's number of each cell's type.
+    pub types: Vec<u8>,
+}
 
-/// Writes one frame, complete or not at all: `points` (m), the four points of each tetrahedron, and fields over both.
+impl Cells {
+    /// Adds a cell.
+    pub fn push(&mut self, kind: u8, points: impl IntoIterator<Item = u32>) {
+        self.points.extend(points);
+        self.ends.push(self.points.len() as i64);
+        self.types.push(kind);
+    }
+}
+
+/// Writes one frame, complete or not at all: `points` (m), cells, and fields over both.
 ///
 /// The bytes depend on nothing but the arguments, whatever the number of threads.
 ///
 /// # Errors
-/// [`OutputError::Shape`] if a field's length or a tetrahedron does not fit the points and cells, or if two fields have
+/// [`OutputError::Shape`] if a field's length or a cell does not fit the points and cells, or if two fields have
 /// the same name; [`OutputError::Io`] if the file cannot be written.
 pub fn write_vtu(
     path: &Path,
     points: &[[f64; 3]],
-    tets: &[[u32; 4]],
+    cells: &Cells,
     point_fields: &[Field<'_>],
     cell_fields: &[Field<'_>],
 ) -> Result<(), OutputError> {
-    check(points.len(), tets, point_fields, cell_fields).map_err(|reason| OutputError::shape(path, reason))?;
-    // Counted from 1: VTK's offsets point past the end of each cell.
-    let offsets: Vec<i64> = (1..=tets.len() as i64).map(|cell| 4 * cell).collect();
-    let types = vec![VTK_TETRA; tets.len()];
+    check(points.len(), cells, point_fields, cell_fields).map_err(|reason| OutputError::shape(path, reason))?;
 
     let mut arrays = Appended::default();
     let mut xml = String::from(
@@ -70,7 +84,8 @@ pub fn write_vtu(
          header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n  <UnstructuredGrid>\n",
     );
     let say = "writing to a String cannot fail";
-    writeln!(xml, "    <Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">", points.len(), tets.len()).expect(say);
+    writeln!(xml, "    <Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">", points.len(), cells.types.len())
+        .expect(say);
     for (section, fields) in [("PointData", point_fields), ("CellData", cell_fields)] {
         writeln!(xml, "      <{section}>").expect(say);
         for field in fields {
@@ -86,9 +101,9 @@ pub fn write_vtu(
     xml.push_str("      <Points>\n");
     xml.push_str(&arrays.add("Float64", "Points", 3, points.as_flattened(), f64::to_le_bytes));
     xml.push_str("      </Points>\n      <Cells>\n");
-    xml.push_str(&arrays.add("UInt32", "connectivity", 1, tets.as_flattened(), u32::to_le_bytes));
-    xml.push_str(&arrays.add("Int64", "offsets", 1, &offsets, i64::to_le_bytes));
-    xml.push_str(&arrays.add("UInt8", "types", 1, &types, u8::to_le_bytes));
+    xml.push_str(&arrays.add("UInt32", "connectivity", 1, &cells.points, u32::to_le_bytes));
+    xml.push_str(&arrays.add("Int64", "offsets", 1, &cells.ends, i64::to_le_bytes));
+    xml.push_str(&arrays.add("UInt8", "types", 1, &cells.types, u8::to_le_bytes));
     // The underscore marks where the raw bytes begin.
     xml.push_str("      </Cells>\n    </Piece>\n  </UnstructuredGrid>\n  <AppendedData encoding=\"raw\">\n_");
     write_atomic(path, |file| {
@@ -99,16 +114,12 @@ pub fn write_vtu(
 }
 
 /// What is wrong with the shapes, if anything.
-fn check(
-    points: usize,
-    tets: &[[u32; 4]],
-    point_fields: &[Field<'_>],
-    cell_fields: &[Field<'_>],
-) -> Result<(), String> {
-    if let Some((cell, tet)) = tets.iter().enumerate().find(|(_, tet)| tet.iter().any(|&p| p as usize >= points)) {
-        return Err(format!("cell {cell} names points {tet:?}, there are {points}"));
+fn check(points: usize, cells: &Cells, point_fields: &[Field<'_>], cell_fields: &[Field<'_>]) -> Result<(), String> {
+    if let Some(at) = cells.points.iter().position(|&p| p as usize >= points) {
+        let cell = cells.ends.partition_point(|end| *end <= at as i64);
+        return Err(format!("cell {cell} names point {}, there are {points}", cells.points[at]));
     }
-    for (fields, kind, count) in [(point_fields, "point", points), (cell_fields, "cell", tets.len())] {
+    for (fields, kind, count) in [(point_fields, "point", points), (cell_fields, "cell", cells.types.len())] {
         for (place, field) in fields.iter().enumerate() {
             let (name, components, len) = (field.name, field.components, field.values.len());
             if components == 0 || components.checked_mul(count) != Some(len) {

@@ -75,7 +75,7 @@ pub enum Mesh {
     },
 }
 
-/// A rectangular beam with its edges along the axes: cells are hexahedra, each split into 6 tetrahedra.
+/// A rectangular beam with its edges along the axes: cells are boxes, each of 6 tetrahedra, 1 hexahedron or 2 prisms.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Beam {
@@ -89,6 +89,15 @@ pub struct Beam {
     #[serde(default)]
     #[schemars(inner(range(min = -1e6, max = 1e6)))]
     pub origin: [f64; 3],
+    /// What the cells are made of: `tetrahedron_p1`, or another solid element of the build.
+    #[serde(default = "linear")]
+    #[schemars(length(min = 1))]
+    pub element: String,
+}
+
+/// The element of a beam that names none.
+fn linear() -> String {
+    "tetrahedron_p1".to_string()
 }
 
 /// A constitutive law with its parameters, over some elements.

@@ -272,7 +272,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
             "precision": precision_name(self.scene.solver.precision),
             "integrator": integrator_name(self.scene.solver.integrator),
             "nodes": self.model.mesh.nodes().len(),
-            "elements": self.model.mesh.tets().len(),
+            "elements": self.model.mesh.len(),
             "steps": self.state.step,
             "step_s": self.step * scale.time,
             "simulated_time_s": self.state.time * scale.time,
@@ -309,7 +309,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
 
     /// The element that left its law's domain, by itself: enough to evaluate it again.
     fn failure(&self, e: &LeftDomain) -> Value {
-        let nodes = self.system.body.elements[e.element as usize].map(|n| n as usize);
+        let nodes = &self.system.body.elements[e.element as usize];
         let u = self.in_si(&self.state.u, self.model.scale.length);
         json!({
             "error": e.to_string(),
@@ -317,8 +317,9 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
             "parameters": self.model.assignment.parameters(e.element),
             "element": e.element,
             "time_s": self.state.time * self.model.scale.time,
-            "rest_positions_m": nodes.map(|n| self.model.mesh.nodes()[n]),
-            "last_displacements_m": nodes.map(|n| u[n]),
+            "kind": self.model.mesh.kind(crate::mesh::ElementId(e.element)).info.name,
+            "rest_positions_m": nodes.iter().map(|n| self.model.mesh.nodes()[*n as usize]).collect::<Vec<_>>(),
+            "last_displacements_m": nodes.iter().map(|n| u[*n as usize]).collect::<Vec<_>>(),
         })
     }
 }

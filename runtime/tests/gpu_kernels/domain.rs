@@ -26,7 +26,7 @@ fn inverted(all: &Disjoint, elements: &[u32]) -> Vector {
         let corner = 4 * e as usize;
         for i in 0..3 {
             // F = -I: edge k of the element becomes its negative.
-            let edge = edges(&all.body.rest[e as usize].shape_gradients);
+            let edge = edges(&all.body.rest[e as usize][0].inverse_jacobian);
             for k in 0..3 {
                 u[corner + 1 + k][i] = u[corner][i] - 2.0 * edge[k][i];
             }

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use tensormass_kernels::LawEntry;
-use tensormass_kernels::batch::RestElement;
+use tensormass_kernels::RestPoint;
 use tensormass_kernels::shader::{Binding, LawShaders, Shader};
 use tensormass_runtime::body::LawBatch;
 use tensormass_runtime::gpu::{Gpu, GpuOptions};
@@ -60,9 +60,10 @@ fn law(function: &str) -> &'static LawEntry {
 
 /// Evaluates a function of pairs on the device.
 fn evaluated(gpu: &Arc<Gpu>, function: &str, arguments: &[[f64; 2]]) -> Vec<f64> {
-    let rest = vec![RestElement { shape_gradients: [0.0; 9], volume: 1.0 }; arguments.len()];
+    let rest = vec![RestPoint { inverse_jacobian: [0.0; 9], weight: 1.0 }; arguments.len()];
     let batch = LawBatch {
         law: law(function),
+        element: tensormass_kernels::linear_tetrahedron(),
         elements: (0..arguments.len() as u32).collect(),
         constants: arguments.as_flattened().to_vec(),
         per_element: true,

@@ -6,9 +6,9 @@
 use std::collections::HashMap;
 
 use tensormass_kernels::GENERATED;
-use tensormass_kernels::batch::RestElement;
+use tensormass_kernels::RestPoint;
 use tensormass_runtime::body::{Body, LawBatch};
-use tensormass_runtime::mesh::{TetMesh, shape_gradients};
+use tensormass_runtime::mesh::{Mesh, shape_gradients};
 use tensormass_runtime::{LawEntry, laws};
 use tensormass_testing::codegen::derivation::Derivation;
 use tensormass_testing::codegen::element::{ElementKernels, kernels, tetrahedron_p1};
@@ -36,12 +36,12 @@ pub fn vectors(count: usize, magnitude: f64, rng: &mut Rng) -> Vector {
 }
 
 /// A body without supports and loads, with random masses; rest data and constants become numbers of f32.
-pub fn body(elements: Vec<[u32; 4]>, rest: &[RestElement<f64>], batches: Vec<LawBatch>, rng: &mut Rng) -> Body {
+pub fn body(elements: Vec<[u32; 4]>, rest: &[RestPoint<f64>], batches: Vec<LawBatch>, rng: &mut Rng) -> Body {
     let round =
-        |r: &RestElement<f64>| RestElement { shape_gradients: r.shape_gradients.map(single), volume: single(r.volume) };
+        |r: &RestPoint<f64>| RestPoint { inverse_jacobian: r.inverse_jacobian.map(single), weight: single(r.weight) };
     let nodes = elements.iter().flatten().max().map_or(0, |n| *n as usize + 1);
     Body {
-        rest: rest.iter().map(round).collect(),
+        rest: rest.iter().map(|r| [round(r)]).collect(),
         batches,
         masses: (0..nodes).map(|_| single(rng.uniform(0.5, 2.0))).collect(),
         element_masses: vec![1.0; elements.len()],
@@ -51,8 +51,8 @@ pub fn body(elements: Vec<[u32; 4]>, rest: &[RestElement<f64>], batches: Vec<Law
         mass_damping: 0.0,
         stiffness_damping: 0.0,
         diameter: 1.0,
-        volume: rest.iter().map(|r| r.volume).sum(),
-        elements,
+        volume: rest.iter().map(|r| r.weight).sum(),
+        elements: elements.into_iter().collect(),
     }
 }
 
@@ -65,19 +65,19 @@ pub fn batches(laws: &[&'static LawEntry], elements: usize, rng: &mut Rng) -> Ve
         let materials = if per_element { elements.len() } else { 1 };
         let material = |_| law.constants(&rng.parameters(law.info));
         let constants = (0..materials).flat_map(material).map(single).collect();
-        LawBatch { law, elements, constants, per_element }
+        LawBatch { law, element: tensormass_kernels::linear_tetrahedron(), elements, constants, per_element }
     };
     (0..count).map(&mut batch).collect()
 }
 
 /// The rest data of a mesh.
-pub fn rest(mesh: &TetMesh) -> Vec<RestElement<f64>> {
+pub fn rest(mesh: &Mesh) -> Vec<RestPoint<f64>> {
     mesh.elements().map(|e| rest_element(mesh.shape_gradients(e))).collect()
 }
 
-fn rest_element(g: tensormass_runtime::mesh::ShapeGradients) -> RestElement<f64> {
+fn rest_element(g: tensormass_runtime::mesh::ShapeGradients) -> RestPoint<f64> {
     let rows = g.gradients.as_flattened();
-    RestElement { shape_gradients: std::array::from_fn(|k| rows[k]), volume: g.volume }
+    RestPoint { inverse_jacobian: std::array::from_fn(|k| rows[k]), weight: g.volume }
 }
 
 /// Elements that share no node: a node's sum is one slot.
@@ -95,7 +95,7 @@ impl Disjoint {
     pub fn new(laws: &[&'static LawEntry], count: usize, analysis: &Analysis, rng: &mut Rng) -> Self {
         let elements: Vec<[u32; 4]> = (0..count as u32).map(|e| [0, 1, 2, 3].map(|k| 4 * e + k)).collect();
         let corners: Vec<[[f64; 3]; 4]> = (0..count).map(|_| tetrahedron(rng)).collect();
-        let rest: Vec<RestElement<f64>> = corners.iter().map(|c| rest_element(shape_gradients(c))).collect();
+        let rest: Vec<RestPoint<f64>> = corners.iter().map(|c| rest_element(shape_gradients(c))).collect();
         let batches = batches(laws, count, rng);
         let body = body(elements, &rest, batches, rng);
         let mut all = Self { body, u: vec![[0.0; 3]; 4 * count], du: vec![[0.0; 3]; 4 * count] };
@@ -203,7 +203,7 @@ impl Analysis {
         kernel.outputs().map(|(role, _)| *role).zip(values).collect()
     }
 
-    fn gradient(&self, nodes: &[u32; 4], u: &[[f64; 3]], shape: &[Bound]) -> Vec<Bound> {
+    fn gradient(&self, nodes: &[u32], u: &[[f64; 3]], shape: &[Bound]) -> Vec<Bound> {
         let nodal: Vec<Bound> = nodes.iter().flat_map(|n| u[*n as usize]).map(Bound::exact).collect();
         let inputs = [(Input::NodalDisplacement, nodal.as_slice()), (Input::ShapeGradients, shape)];
         self.element.gradient.interpret(&inputs).expect("the inputs of a gather").remove(0)
@@ -282,9 +282,9 @@ impl Analysis {
 fn given(body: &Body, batch: &LawBatch, place: usize) -> (Vec<Bound>, Vec<Bound>, Bound) {
     let count = batch.law.info.constants.len();
     let first = if batch.per_element { place * count } else { 0 };
-    let rest = &body.rest[batch.elements[place] as usize];
+    let rest = &body.rest[batch.elements[place] as usize][0];
     let exact = |x: &[f64]| x.iter().copied().map(Bound::exact).collect::<Vec<_>>();
-    (exact(&batch.constants[first..first + count]), exact(&rest.shape_gradients), Bound::exact(rest.volume))
+    (exact(&batch.constants[first..first + count]), exact(&rest.inverse_jacobian), Bound::exact(rest.weight))
 }
 
 /// The greatest |found - wanted| as a part of its bound, which it must not exceed.

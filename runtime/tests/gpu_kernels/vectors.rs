@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tensormass_kernels::batch::RestElement;
+use tensormass_kernels::RestPoint;
 use tensormass_runtime::backend::{ALPHA, BETA, Backend, Descent, REGISTERS, RUNNING, SUM, Scalar, Update};
 use tensormass_runtime::body::{Body, Constraint};
 use tensormass_runtime::gpu::{Gpu, GpuBackend, GpuOptions, GpuVector};
@@ -22,9 +22,9 @@ const MOTIONS: [f64; 3] = [0.25, -3.5, 0.0];
 
 /// Constraints at some nodes: every combination of components, each component following one of the motions.
 fn constrained(nodes: usize) -> Body {
-    let rest = [RestElement { shape_gradients: [0.0; 9], volume: 1.0 }];
+    let rest = [RestPoint { inverse_jacobian: [0.0; 9], weight: 1.0 }];
     let mut body = body(vec![[0, 0, 0, nodes as u32 - 1]], &rest, vec![], &mut Rng::new(0));
-    (body.elements, body.rest) = (vec![], vec![]);
+    (body.elements, body.rest) = Default::default();
     let components = (0..nodes as u32).flat_map(|n| (0..3u8).map(move |c| (n, c)));
     let imposed = components.filter(|(n, c)| ((n % 9) >> c) & 1 == 1);
     let constraint = |(motion, (node, component))| Constraint { node, component, motion: motion % MOTIONS.len() };

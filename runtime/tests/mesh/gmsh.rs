@@ -1,6 +1,6 @@
 //! The Gmsh reader: both versions give the same mesh, every fault is refused with its line, and no text makes it panic.
 
-use super::{ids, two_tets};
+use super::{faces, two_tets};
 use std::path::Path;
 use tensormass_runtime::mesh::gmsh::{MeshFile, parse, read};
 use tensormass_runtime::mesh::{ElementId, NodeId, Orientation};
@@ -119,7 +119,7 @@ fn both_versions_give_the_same_mesh() {
         assert_eq!(nodes("edge"), Some(vec![0, 1]), "{version}");
         assert_eq!(nodes("tip"), Some(vec![4]), "{version}");
         assert_eq!(mesh.face_group_names().collect::<Vec<_>>(), ["base plate"], "{version}");
-        assert_eq!(mesh.face_group("base plate"), Some(&ids(&[[0, 2, 1]])[..]), "{version}: outward");
+        assert_eq!(mesh.face_group("base plate"), Some(&faces(&[[0, 2, 1]])[..]), "{version}: outward");
         assert_eq!(mesh.element_group_names().collect::<Vec<_>>(), ["body", "volume_5"], "{version}");
         assert_eq!(mesh.element_group("body"), Some(&[ElementId(0)][..]), "{version}");
         assert_eq!(mesh.element_group("volume_5"), Some(&[ElementId(0), ElementId(1)][..]), "{version}");
@@ -177,23 +177,26 @@ const REFUSED: &[(&str, &str, &str, &str)] = &[
     (
         V2,
         "7 4 2 5 2 20 30 40 50",
-        "7 5 2 5 2 20 30 40 50 10 20 30 40",
-        "two.msh:31: a hexahedron (Gmsh element type 5); \
-         only 4-node tetrahedra can be simulated: mesh without `Recombine` and without layers",
+        "7 7 2 5 2 20 30 40 50 10",
+        "two.msh:31: a pyramid (Gmsh element type 7); \
+         mesh it otherwise, for instance into tetrahedra; elements of this build: hexahedron_q1, hexahedron_s2, prism_p1, \
+         quadrangle_q1, quadrangle_s2, tetrahedron_p1, tetrahedron_p2, triangle_p1, triangle_p2",
     ),
     (
         V4,
         "3 2 4 1",
-        "3 2 11 1",
-        "two.msh:52: a second-order tetrahedron (Gmsh element type 11); \
-         only 4-node tetrahedra can be simulated: mesh to first order (gmsh MODEL.geo -3 -order 1)",
+        "3 2 29 1",
+        "two.msh:52: a tetrahedron of higher order (Gmsh element type 29); \
+         mesh to first or second order (gmsh MODEL.geo -3 -order 2); elements of this build: hexahedron_q1, hexahedron_s2, prism_p1, \
+         quadrangle_q1, quadrangle_s2, tetrahedron_p1, tetrahedron_p2, triangle_p1, triangle_p2",
     ),
     (
         V4,
         "3 2 4 1",
         "3 2 77 1",
         "two.msh:52: an element of unknown shape (Gmsh element type 77); \
-         only 4-node tetrahedra can be simulated: mesh without `Recombine` and without layers",
+         mesh it otherwise, for instance into tetrahedra; elements of this build: hexahedron_q1, hexahedron_s2, prism_p1, \
+         quadrangle_q1, quadrangle_s2, tetrahedron_p1, tetrahedron_p2, triangle_p1, triangle_p2",
     ),
     (V4, "3 2 4 1", "3 3 4 1", "two.msh:52: entity 3 of dimension 3 is not in $Entities; {SAVE}"),
     (
@@ -307,8 +310,8 @@ const REFUSED: &[(&str, &str, &str, &str)] = &[
         V2,
         "4 2 2 1 1 10 20 30",
         "4 2 2 1 1 10 20 50",
-        "two.msh:28: 1 triangle of face group `base plate` is not a face of any element, first is (0, 1, 4); \
-         take faces whose three nodes belong to one element, or remove the group",
+        "two.msh:28: 1 face of face group `base plate` is not a face of any element, first is (0, 1, 4); \
+         take faces whose nodes are those of one face of an element, or remove the group",
     ),
     (
         "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n1\n1 0 0 0\n$EndNodes\n",

@@ -1,14 +1,14 @@
 //! Meshes and beams that are refused, each with its message.
 
-use super::{Vec3, ids, two_tets};
-use tensormass_runtime::mesh::{ElementId, Groups, MeshError, NodeId, TetMesh, beam};
+use super::{Vec3, faces, ids, two_tets};
+use tensormass_runtime::mesh::{ElementId, Groups, Mesh, MeshError, NodeId, beam};
 
 /// Spoils the mesh of two elements and gives the message of its refusal.
 fn refusal(spoil: impl FnOnce(&mut Vec<Vec3>, &mut Vec<[NodeId; 4]>, &mut Groups)) -> String {
     let good = two_tets();
     let (mut nodes, mut tets, mut groups) = (good.nodes().to_vec(), good.tets().to_vec(), Groups::default());
     spoil(&mut nodes, &mut tets, &mut groups);
-    TetMesh::new(nodes, tets, groups).expect_err("a mesh to refuse").to_string()
+    Mesh::tetrahedra(nodes, tets, groups).expect_err("a mesh to refuse").to_string()
 }
 
 #[test]
@@ -33,7 +33,7 @@ fn bad_meshes_are_refused_with_a_remedy() {
     check(
         refusal(|_, tets, _| tets[1][3] = NodeId(1)),
         "1 element names a node twice, first is element 1 with nodes 1, 2, 3, 1; \
-         a tetrahedron needs four different nodes",
+         an element needs different nodes",
     );
     check(
         refusal(|nodes, _, _| nodes[4] = [0.25, 0.25, 0.5]),
@@ -67,13 +67,13 @@ fn bad_meshes_are_refused_with_a_remedy() {
         "element group `soft` names element 2 of 2; number from 0 to 2 less one",
     );
     check(
-        refusal(|_, _, groups| drop(groups.faces.insert("side".to_owned(), ids(&[[0, 1, 7]])))),
+        refusal(|_, _, groups| drop(groups.faces.insert("side".to_owned(), faces(&[[0, 1, 7]])))),
         "face group `side` names node 7 of 5; number from 0 to 5 less one",
     );
     check(
-        refusal(|_, _, groups| drop(groups.faces.insert("side".to_owned(), ids(&[[0, 1, 2], [0, 1, 4]])))),
-        "1 triangle of face group `side` is not a face of any element, first is (0, 1, 4); \
-         take faces whose three nodes belong to one element, or remove the group",
+        refusal(|_, _, groups| drop(groups.faces.insert("side".to_owned(), faces(&[[0, 1, 2], [0, 1, 4]])))),
+        "1 face of face group `side` is not a face of any element, first is (0, 1, 4); \
+         take faces whose nodes are those of one face of an element, or remove the group",
     );
 }
 
@@ -82,13 +82,13 @@ fn flatness_does_not_depend_on_the_unit() {
     // Beyond these, volumes leave the range of numbers that keep all their digits.
     for (scale, valid) in [(1e-110, false), (1e-100, true), (1e-6, true), (1e6, true), (1e102, true), (1e110, false)] {
         let nodes = two_tets().nodes().iter().map(|x| x.map(|c| c * scale)).collect();
-        let mesh = TetMesh::new(nodes, two_tets().tets().to_vec(), Groups::default());
+        let mesh = Mesh::tetrahedra(nodes, two_tets().tets().to_vec(), Groups::default());
         assert_eq!(mesh.is_ok(), valid, "scale {scale}: {mesh:?}");
         let degenerate = matches!(mesh, Err(MeshError::Degenerate { count: 2, element: ElementId(0), .. }));
         assert_eq!(degenerate, !valid, "scale {scale}: {mesh:?}");
     }
     let nodes = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1e-12]];
-    assert!(TetMesh::new(nodes, ids(&[[0, 1, 2, 3]]), Groups::default()).is_ok(), "thin, but not flat");
+    assert!(Mesh::tetrahedra(nodes, ids(&[[0, 1, 2, 3]]), Groups::default()).is_ok(), "thin, but not flat");
 }
 
 #[test]

@@ -8,10 +8,10 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use tensormass_runtime::LawEntry;
-use tensormass_runtime::body::{Body, Constraint, LawBatch, lump};
+use tensormass_runtime::body::{Body, Constraint, LawBatch, Rows, lump};
 use tensormass_runtime::cpu::{CpuBackend, CpuField, Precision};
 use tensormass_runtime::history::History;
-use tensormass_runtime::mesh::TetMesh;
+use tensormass_runtime::mesh::{ElementId, Mesh};
 use tensormass_runtime::scene::{self, Override, Scene};
 use tensormass_runtime::simulate::{Ending, Outcome, Silent, run};
 use tensormass_runtime::system::System;
@@ -172,27 +172,28 @@ pub fn table(law: &LawEntry, values: &[f64]) -> String {
     format!("{{ {} }}", items.join(", "))
 }
 
-/// A body of one law in SI units (1000 kg/m3); `imposed` are (node, component, displacement), ascending.
-pub fn body(mesh: &TetMesh, law: &'static LawEntry, parameters: &[f64], imposed: &[(u32, u8, f64)]) -> Body {
+/// A body of one law, of elements of any kinds, in SI units (1000 kg/m3); `imposed` are (node, component, displacement), ascending.
+pub fn body(mesh: &Mesh, law: &'static LawEntry, parameters: &[f64], imposed: &[(u32, u8, f64)]) -> Body {
     let density = 1000.0;
-    let elements: Vec<[u32; 4]> = mesh.tets().iter().map(|t| t.map(|n| n.0)).collect();
-    let gradients: Vec<_> = mesh.elements().map(|e| mesh.shape_gradients(e)).collect();
-    let rest = gradients.iter().map(|g| {
-        let rows = g.gradients.as_flattened();
-        tensormass_kernels::batch::RestElement { shape_gradients: std::array::from_fn(|k| rows[k]), volume: g.volume }
-    });
-    let element_masses: Vec<f64> = gradients.iter().map(|g| g.volume * density).collect();
+    let element_masses: Vec<f64> = mesh.elements().map(|e| mesh.volume(e) * density).collect();
+    let elements: Rows<u32> = mesh.elements().map(|e| mesh.element_nodes(e).iter().map(|n| n.0)).collect();
+    // One batch a kind.
+    let batch = |of: &[ElementId]| LawBatch {
+        law,
+        element: mesh.kind(of[0]),
+        elements: of.iter().map(|e| e.0).collect(),
+        constants: law.constants(parameters),
+        per_element: false,
+    };
+    let all: Vec<ElementId> = mesh.elements().collect();
+    let kinds = all.chunk_by(|a, b| std::ptr::eq(mesh.kind(*a), mesh.kind(*b)));
+    let each = mesh.elements().zip(elements.iter()).zip(&element_masses);
     let [low, high] = mesh.bounding_box();
     let constraint = |(motion, &(node, component, _)): (usize, &(u32, u8, f64))| Constraint { node, component, motion };
     Body {
-        rest: rest.collect(),
-        batches: vec![LawBatch {
-            law,
-            elements: (0..elements.len() as u32).collect(),
-            constants: law.constants(parameters),
-            per_element: false,
-        }],
-        masses: lump(mesh.nodes().len(), &elements, &element_masses),
+        rest: mesh.elements().map(|e| mesh.rest(e)).collect(),
+        batches: kinds.map(batch).collect(),
+        masses: lump(mesh.nodes().len(), each.map(|((e, nodes), mass)| (mesh.kind(e), nodes, *mass))),
         elements,
         element_masses,
         constraints: imposed.iter().enumerate().map(constraint).collect(),

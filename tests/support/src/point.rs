@@ -2,7 +2,8 @@
 
 use tensormass_codegen::derivation::Derivation;
 use tensormass_codegen::ir::{Input, Op, Output, ValidKernel};
-use tensormass_kernels::batch::{Batch, RestElement};
+use tensormass_kernels::RestPoint;
+use tensormass_kernels::batch::Batch;
 use tensormass_kernels::{BatchKernels, DampingKernels, LawEntry, Real};
 
 use crate::random::Rng;
@@ -35,7 +36,7 @@ impl<R: Real> Compiled<R> {
 
     fn on_batch<T>(&self, f: impl FnOnce(&BatchKernels<R>, &Batch<R>) -> T) -> T {
         let unit = |k: usize| R::from_f64(if k.is_multiple_of(4) { 1.0 } else { 0.0 });
-        let rest = [RestElement { shape_gradients: std::array::from_fn(unit), volume: R::from_f64(1.0) }];
+        let rest = [RestPoint { inverse_jacobian: std::array::from_fn(unit), weight: R::from_f64(1.0) }];
         let count = self.constants.len();
         f(&self.kernels, &Batch { nodes: &[[0, 1, 2, 3]], rest: &rest, constants: &self.constants, stride: 0, count })
     }

@@ -1,6 +1,7 @@
 //! `cargo xtask reproduce tables-1-2`: makes docs/reproduction.md from runs of the traction test; `extremes`: the accuracy
-//! of laws.
+//! of laws; `accuracy`: that of elements.
 
+pub mod accuracy;
 mod chain;
 mod conclusions;
 mod document;

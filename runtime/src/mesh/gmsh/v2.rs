@@ -1,6 +1,6 @@
 //! Nodes and elements of version 2.2: one a line.
 
-use super::element_type::dimension;
+use super::element_type::kind;
 use super::lines::{Lines, Problem};
 use super::{Raw, RawElement, RawNode};
 
@@ -26,7 +26,7 @@ pub(super) fn elements(lines: &mut Lines<'_>, raw: &mut Raw) -> Result<(), Probl
         let line = lines.expect("an element")?;
         let mut words = line.words();
         let _number: u64 = words.read("an element number")?;
-        let dimension = dimension(&line, words.read("an element type")?)?;
+        let kind = kind(&line, words.read("an element type")?)?;
         let tags: u64 = words.read("the number of tags")?;
         let mut physical = 0;
         for tag in 0..tags {
@@ -35,13 +35,13 @@ pub(super) fn elements(lines: &mut Lines<'_>, raw: &mut Raw) -> Result<(), Probl
                 physical = value;
             }
         }
-        let mut nodes = [0; 4];
-        for node in &mut nodes[..=dimension] {
+        let mut nodes = vec![0; kind.nodes()];
+        for node in &mut nodes {
             *node = words.read("a node tag")?;
         }
         words.end()?;
         let set = raw.sets.intern([physical]);
-        raw.elements[dimension].push(RawElement { nodes, set, line: line.number_u32() });
+        raw.elements[kind.dimension()].push(RawElement { kind: kind.element, nodes, set, line: line.number_u32() });
     }
     merge_repeated(raw);
     Ok(())
@@ -55,11 +55,11 @@ fn merge_repeated(raw: &mut Raw) {
         return;
     }
     for elements in elements {
-        let mut keys: Vec<([u64; 4], usize)> = elements
+        let mut keys: Vec<(Vec<u64>, usize)> = elements
             .iter()
             .enumerate()
             .map(|(place, element)| {
-                let mut nodes = element.nodes;
+                let mut nodes = element.nodes.clone();
                 nodes.sort_unstable();
                 (nodes, place)
             })

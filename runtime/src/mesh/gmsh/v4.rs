@@ -1,6 +1,6 @@
 //! Entities, nodes and elements of version 4.1: in blocks, one a geometric entity.
 
-use super::element_type::dimension;
+use super::element_type::kind;
 use super::lines::{Lines, Problem, Words};
 use super::{Raw, RawElement, RawNode, SAVE, Sets};
 use std::collections::BTreeMap;
@@ -103,7 +103,8 @@ pub(super) fn elements(lines: &mut Lines<'_>, entities: &Entities, raw: &mut Raw
         let line = lines.expect("a block of elements")?;
         let mut words = line.words();
         let entity = block(&mut words)?;
-        let dimension = dimension(&line, words.read("an element type")?)?;
+        let kind = kind(&line, words.read("an element type")?)?;
+        let dimension = kind.dimension();
         let count: u64 = words.read("the number of elements in the block")?;
         words.end()?;
         if entity.0 != dimension {
@@ -123,12 +124,12 @@ pub(super) fn elements(lines: &mut Lines<'_>, entities: &Entities, raw: &mut Raw
             let line = lines.expect("an element")?;
             let mut words = line.words();
             let _tag: u64 = words.read("an element tag")?;
-            let mut nodes = [0; 4];
-            for node in &mut nodes[..=dimension] {
+            let mut nodes = vec![0; kind.nodes()];
+            for node in &mut nodes {
                 *node = words.read("a node tag")?;
             }
             words.end()?;
-            raw.elements[dimension].push(RawElement { nodes, set, line: line.number_u32() });
+            raw.elements[dimension].push(RawElement { kind: kind.element, nodes, set, line: line.number_u32() });
         }
     }
     check_total(lines, "elements", total, raw.elements.iter().map(|kind| kind.len() as u64).sum())

@@ -1,0 +1,83 @@
+//! Errors of every element against the size of its mesh, as CSV: what docs/accuracy.md is made of.
+//!
+//! Manufactured solutions for a linear and a finite law, and the deflection of the cantilever CANTI_SMALL.
+
+#[path = "../tests/support/elements.rs"]
+mod elements;
+#[path = "../tests/support/manufactured.rs"]
+mod manufactured;
+#[path = "../tests/support/mod.rs"]
+mod support;
+
+use elements::of_dimension;
+use manufactured::solve;
+use support::{Random, body, done, parameters, probe, scene, system};
+use tensormass_runtime::laws;
+
+const BEAM: &str = r#"
+[mesh]
+beam = { size = [10, 1, 1], cells = [20, 2, 2] }
+
+[[material]]
+law = "hooke"
+density = 1000.0
+parameters = { young = 1e6, poisson = 0.3 }
+
+[[boundary]]
+nodes = "near(x, xmin)"
+fix = ["x", "y", "z"]
+
+[[load]]
+kind = "traction"
+faces = "near(x, xmax)"
+value = [0.0, 0.0, 1.0]
+
+[solver]
+integrator = "static"
+precision = "f64"
+cg = { tolerance = 1e-10, max_iterations = 20000 }
+
+[[probe]]
+name = "work"
+kind = "energy"
+part = "external"
+"#;
+
+fn main() {
+    let linear = laws().iter().find(|l| l.info.structure.linear).expect("a linear law");
+    let finite = laws().iter().find(|l| l.info.domain.is_some() && l.info.structure.isotropic).expect("a finite law");
+    println!("what,element,order,law,cells,unknowns,displacement,energy");
+    for law in [linear, finite] {
+        for element in of_dimension(3).chain(of_dimension(2)) {
+            let cells: &[usize] = match (element.info.order, element.info.dimension) {
+                (1, 3) => &[4, 8, 16],
+                (1, _) => &[8, 16, 32, 64],
+                (_, 3) => &[2, 4, 8],
+                _ => &[4, 8, 16, 32],
+            };
+            for n in cells {
+                let e = solve(element, law, *n);
+                println!(
+                    "manufactured,{},{},{},{},{},{:e},{:e}",
+                    element.info.name, element.info.order, law.info.name, e.cells, e.unknowns, e.displacement, e.energy
+                );
+            }
+        }
+    }
+    for element in of_dimension(3) {
+        for across in [1, 2, 4, 6] {
+            // The unknowns of a quadratic mesh are those of a linear one of twice the cells.
+            if element.info.order > 1 && across > 4 {
+                continue;
+            }
+            let set = [
+                format!("mesh.beam.cells=[{}, {across}, {across}]", 10 * across),
+                format!("mesh.beam.element=\"{}\"", element.info.name),
+            ];
+            let outcome = done(&scene(BEAM, &set));
+            let unknowns = outcome.summary["nodes"].as_u64().expect("a count") * 3;
+            let tip = -probe(&outcome, "work");
+            println!("cantilever,{},{},hooke,{across},{unknowns},{tip:e},0", element.info.name, element.info.order);
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! Meshes of any element, distorted, and quadrature that no element declares.
+#![allow(dead_code)] // every test links its own copy and uses a part of it
+
+use tensormass_kernels::{ElementEntry, ElementInfo, elements};
+use tensormass_runtime::mesh::{Block, Groups, Mesh, NodeId, beam_of};
+use tensormass_testing::codegen::element::{ElementDeclaration, Shape, declarations};
+
+use super::Random;
+
+/// The elements of which bodies of this dimension can be made.
+pub fn of_dimension(dimension: usize) -> impl Iterator<Item = &'static ElementEntry> {
+    elements().iter().filter(move |e| e.info.dimension == dimension)
+}
+
+/// The unit cube, or the unit square, in n cells along each side.
+pub fn unit(element: &'static ElementEntry, n: usize) -> Mesh {
+    if element.info.dimension == 3 {
+        return beam_of(element, [1.0; 3], [n; 3], [0.0; 3]).unwrap_or_else(|e| panic!("{e}"));
+    }
+    // A side of a cube of the solid elements whose faces are this element.
+    let solid = of_dimension(3).find(|solid| {
+        let mut faces = solid.info.faces.iter();
+        solid.info.shape != "prism" && faces.any(|face| face.element == element.info.name)
+    });
+    let cube = unit(solid.unwrap_or_else(|| panic!("{} is no face", element.info.name)), n);
+    // Seen from outside, x runs to the right and y up.
+    let side = cube.face_group("zmax").expect("a beam has sides");
+    let mut numbers = std::collections::BTreeMap::new();
+    let (mut nodes, mut block) = (vec![], Block { element, nodes: vec![] });
+    for node in side.iter().flatten() {
+        let number = *numbers.entry(*node).or_insert_with(|| {
+            let [x, y, _] = cube.nodes()[node.index()];
+            nodes.push([x, y, 0.0]);
+            NodeId(nodes.len() as u32 - 1)
+        });
+        block.nodes.push(number);
+    }
+    Mesh::new(nodes, vec![block], Groups::default()).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The two corners between which each node lies, or the node itself twice; a corner is a node of the linear element.
+fn between(info: &ElementInfo) -> Vec<[usize; 2]> {
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+    let middle = |j: usize, [a, b]: [usize; 2]| {
+        let [x, y, z] = [info.reference[j], info.reference[a], info.reference[b]];
+        (0..3).all(|i| near(x[i], 0.5 * (y[i] + z[i])))
+    };
+    let pair = |j: usize| {
+        let pairs = (0..info.nodes).flat_map(|a| (0..a).map(move |b| [a, b])).filter(|p| !p.contains(&j));
+        // A node of a quadratic element that halves the distance of two others is that of an edge.
+        let found = if info.order > 1 { pairs.into_iter().find(|p| middle(j, *p)) } else { None };
+        found.unwrap_or([j, j])
+    };
+    (0..info.nodes).map(pair).collect()
+}
+
+/// The mesh with its inner corners moved at random by a part of the distance of corners, edges kept straight.
+pub fn distorted(mesh: &Mesh, part: f64, seed: u64) -> Mesh {
+    let surface = mesh.surface_nodes();
+    let mut nodes = mesh.nodes().to_vec();
+    let mut random = Random(seed);
+    let plane = mesh.blocks()[0].info().dimension == 2;
+    let mut ends: Vec<Option<[NodeId; 2]>> = vec![None; nodes.len()];
+    for block in mesh.blocks() {
+        let between = between(block.info());
+        for element in block.elements() {
+            for (node, [a, b]) in element.iter().zip(&between) {
+                ends[node.index()] = Some([element[*a], element[*b]]);
+            }
+        }
+    }
+    let cells = (mesh.nodes().len() as f64).powf(1.0 / if plane { 2.0 } else { 3.0 }) - 1.0;
+    for (n, ends) in ends.iter().enumerate() {
+        let is_corner = ends.is_some_and(|[a, b]| a == b);
+        if is_corner && surface.binary_search(&NodeId(n as u32)).is_err() {
+            let [x, y, z] = random.vector(part / cells);
+            let by = [x, y, if plane { 0.0 } else { z }];
+            nodes[n] = std::array::from_fn(|i| nodes[n][i] + by[i]);
+        }
+    }
+    let corners = nodes.clone();
+    for (node, ends) in nodes.iter_mut().zip(ends) {
+        if let Some([a, b]) = ends.filter(|[a, b]| a != b) {
+            *node = std::array::from_fn(|i| 0.5 * (corners[a.index()][i] + corners[b.index()][i]));
+        }
+    }
+    mesh.moved(nodes).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The declaration of an element: its functions are polynomials.
+pub fn declaration(info: &ElementInfo) -> ElementDeclaration {
+    let all = declarations().expect("the build has read them");
+    all.into_iter().find(|e| e.name == info.name).expect("a declared element")
+}
+
+/// Nodes and weights of Gauss' rule on [0, 1], by Newton's method on Legendre's polynomial.
+fn gauss(n: usize) -> Vec<(f64, f64)> {
+    let legendre = |x: f64| {
+        let (mut p, mut q) = (1.0, x);
+        for k in 1..n {
+            let k = k as f64;
+            (p, q) = (q, ((2.0 * k + 1.0) * x * q - k * p) / (k + 1.0));
+        }
+        (q, n as f64 * (x * q - p) / (x * x - 1.0))
+    };
+    let of = |k: usize| {
+        let mut x = (std::f64::consts::PI * (k as f64 + 0.75) / (n as f64 + 0.5)).cos();
+        for _ in 0..50 {
+            let (value, slope) = legendre(x);
+            x -= value / slope;
+        }
+        let slope = legendre(x).1;
+        (0.5 * (1.0 + x), 1.0 / ((1.0 - x * x) * slope * slope))
+    };
+    (0..n).map(of).collect()
+}
+
+/// Points and weights of a rule of five points along each reference coordinate, whatever the element declares.
+pub fn fine_rule(shape: Shape) -> Vec<([f64; 3], f64)> {
+    let line = gauss(5);
+    let full = |t: f64, w: f64| (2.0 * t - 1.0, 2.0 * w);
+    let mut rule = vec![];
+    for &(r, wr) in &line {
+        for &(s, ws) in &line {
+            let plane = shape.dimension() == 2;
+            for &(t, wt) in if plane { &[(0.5, 0.5)][..] } else { &line } {
+                // Simplices by collapsed coordinates.
+                let triangle = ([r, s * (1.0 - r)], wr * ws * (1.0 - r));
+                let (third, wt2) = full(t, wt);
+                rule.push(match shape {
+                    Shape::Triangle => ([triangle.0[0], triangle.0[1], 0.0], triangle.1),
+                    Shape::Tetrahedron => {
+                        let [x, y] = triangle.0;
+                        let left = 1.0 - x - y;
+                        ([x, y, t * left], triangle.1 * wt * left)
+                    }
+                    Shape::Prism => ([triangle.0[0], triangle.0[1], third], triangle.1 * wt2),
+                    _ => {
+                        let ((x, wx), (y, wy)) = (full(r, wr), full(s, ws));
+                        let (z, wz) = if plane { (0.0, 1.0) } else { (third, wt2) };
+                        ([x, y, z], wx * wy * wz)
+                    }
+                });
+            }
+        }
+    }
+    rule
+}
