@@ -13,7 +13,7 @@ use tensormass_runtime::backend::{Backend, ForceField};
 use tensormass_runtime::cg::CgLimits;
 use tensormass_runtime::cpu::{Kernels, Part};
 use tensormass_runtime::integrate::{NewtonLimits, SolverSettings, Statics};
-use tensormass_runtime::mesh::{Mesh, integrals};
+use tensormass_runtime::mesh::{Block, Groups, Mesh, integrals};
 use tensormass_runtime::scene::Preconditioner;
 use tensormass_runtime::system::Integrator;
 
@@ -211,10 +211,10 @@ fn composed_and_fused_kernels_agree() {
 }
 
 /// Static equilibrium where all nodes of the boundary are at G X: all others have to be there, too.
-fn patch(element: &'static ElementEntry, law: &'static LawEntry) {
-    let name = format!("{} of {}", element.info.name, law.info.name);
-    let mesh = distorted(&unit(element, 3), 0.4, 11);
-    let plane = element.info.dimension == 2;
+fn patch(mesh: &Mesh, law: &'static LawEntry) {
+    let kinds: Vec<&str> = mesh.blocks().iter().map(|b| b.info().name).collect();
+    let name = format!("{} of {}", kinds.join(" and "), law.info.name);
+    let plane = mesh.blocks()[0].info().dimension == 2;
     let gradient = [[0.08, 0.05, -0.03], [-0.02, -0.06, 0.04], [0.03, -0.01, 0.07]];
     let at = |x: &[f64; 3]| -> [f64; 3] {
         std::array::from_fn(|i| if plane && i == 2 { 0.0 } else { (0..3).map(|k| gradient[i][k] * x[k]).sum() })
@@ -228,7 +228,7 @@ fn patch(element: &'static ElementEntry, law: &'static LawEntry) {
         .map(|(n, c)| (n, c, at(&nodes[n as usize])[c as usize]))
         .collect();
     assert!((0..nodes.len() as u32).filter(|n| inside(*n)).count() > 3, "{name}: nothing to find");
-    let mut body = body(&mesh, law, &parameters(law), &imposed);
+    let mut body = body(mesh, law, &parameters(law), &imposed);
     for (motion, (_, _, value)) in body.motions.iter_mut().zip(&imposed) {
         *motion = tensormass_runtime::history::History::table(vec![(0.0, 0.0), (1.0, *value)]).expect("a ramp");
     }
@@ -260,10 +260,104 @@ fn patch(element: &'static ElementEntry, law: &'static LawEntry) {
 #[test]
 fn patch_tests() {
     for element in of_dimension(3).chain(of_dimension(2)) {
+        let mesh = distorted(&unit(element, 3), 0.4, 11);
         for law in laws() {
-            patch(element, law);
+            patch(&mesh, law);
         }
     }
+}
+
+/// Boxes and wedges that share faces: both are made on one lattice, so that their nodes have the same numbers.
+#[test]
+fn patch_tests_of_mixed_meshes() {
+    let [boxes, wedges] = ["hexahedron_q1", "prism_p1"].map(|name| tensormass_kernels::element(name).expect("shipped"));
+    let cells = 3;
+    let [of_boxes, of_wedges] = [boxes, wedges].map(|element| unit(element, cells));
+    assert_eq!(of_boxes.nodes(), of_wedges.nodes());
+    let part = |mesh: &Mesh, each: usize, left: bool| {
+        let block = &mesh.blocks()[0];
+        // Cells follow each other along z, then y, then x.
+        let is_left = |e: usize| e / each / (cells * cells) < 2;
+        let nodes = block.elements().enumerate().filter(|(e, _)| is_left(*e) == left).flat_map(|(_, n)| n);
+        Block { element: block.element, nodes: nodes.copied().collect() }
+    };
+    let blocks = vec![part(&of_boxes, 1, true), part(&of_wedges, 2, false)];
+    let mesh = Mesh::new(of_boxes.nodes().to_vec(), blocks, Groups::default()).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(mesh.surface_nodes(), of_boxes.surface_nodes(), "faces between boxes and wedges are inside");
+    for law in laws() {
+        patch(&distorted(&mesh, 0.3, 17), law);
+    }
+}
+
+const PLANE: &str = r#"
+[mesh]
+file = "plane.msh"
+
+[[material]]
+law = "hooke"
+density = 1000.0
+parameters = { young = 1e6, poisson = 0.3 }
+
+[[boundary]]
+nodes = "near(x, xmin)"
+fix = ["x"]
+
+[[boundary]]
+nodes = "near(y, ymin)"
+fix = ["y"]
+
+[[load]]
+kind = "traction"
+faces = "near(x, xmax)"
+value = [1000.0, 0.0, 0.0]
+
+[[load]]
+kind = "gravity"
+acceleration = [0.0, 0.0, -9.81]
+
+[solver]
+integrator = "static"
+precision = "f64"
+cg = { tolerance = 1e-12, max_iterations = 5000 }
+
+[[probe]]
+name = "x"
+kind = "displacement"
+nodes = "near(x, xmax)"
+component = "x"
+
+[[probe]]
+name = "z"
+kind = "displacement"
+nodes = "all"
+component = "z"
+statistic = "max"
+
+[[probe]]
+name = "szz"
+kind = "stress"
+component = "zz"
+
+[[probe]]
+name = "volume"
+kind = "volume"
+elements = "all"
+"#;
+
+/// A plane body of quadratic triangles beside quadrangles, pulled: strain is plane, whatever pushes it along z.
+#[test]
+fn strain_is_plane_in_two_dimensions() {
+    let file = support::repository("runtime/tests/data/plane_4.msh");
+    let set = [format!("mesh.file={:?}", file.to_str().expect("UTF-8"))];
+    let outcome = done(&scene(PLANE, &set));
+    let (young, poisson, pull, length) = (1e6, 0.3, 1000.0, 2.0);
+    let wanted = length * pull * (1.0 - poisson * poisson) / young;
+    assert!(relative(probe(&outcome, "x"), wanted) <= 1e-10, "{} {wanted}", probe(&outcome, "x"));
+    assert_eq!(probe(&outcome, "z"), 0.0);
+    // Cauchy's stress P F' / J; the z component of F is 1.
+    let volume = (1.0 + wanted / length) * (1.0 - pull * poisson * (1.0 + poisson) / young);
+    assert!(relative(probe(&outcome, "szz"), poisson * pull / volume) <= 1e-10, "{}", probe(&outcome, "szz"));
+    assert!(relative(probe(&outcome, "volume"), 2.0 * volume) <= 1e-10, "{}", probe(&outcome, "volume"));
 }
 
 /// Volumes, areas and normals of distorted meshes: the integrals that loads are made of.

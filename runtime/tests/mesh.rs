@@ -1,5 +1,7 @@
 //! Meshes: the beam, groups, boundary, incidence, gradients, quality, and what is refused with which words.
 
+#[path = "mesh/files.rs"]
+mod files;
 #[path = "mesh/gmsh.rs"]
 mod gmsh;
 #[path = "mesh/refused.rs"]

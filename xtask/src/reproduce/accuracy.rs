@@ -154,8 +154,8 @@ fn plot(lines: &[Line], title: &str, of: impl Fn(&Line) -> f64) -> String {
     };
     let ((left, right), (low, high)) = (range(&|v| v.0), range(&|v| v.1));
     let (low, high) = (low.floor(), high.ceil());
-    let (width, height, margin) = (760.0, 480.0, 56.0);
-    let x = |v: f64| margin + (v - left) / (right - left) * (width - margin - 220.0);
+    let (width, height, margin) = (800.0, 480.0, 56.0);
+    let x = |v: f64| margin + (v - left) / (right - left) * (width - margin - 260.0);
     let y = |v: f64| height - margin - (v - low) / (high - low) * (height - 2.0 * margin);
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" \
@@ -207,9 +207,9 @@ fn plot(lines: &[Line], title: &str, of: impl Fn(&Line) -> f64) -> String {
                 svg,
                 "<line x1=\"{0}\" x2=\"{1}\" y1=\"{at}\" y2=\"{at}\" stroke=\"{colour}\" stroke-width=\"2\"/>\
                  <text x=\"{2}\" y=\"{3}\">{element}: slope {4:.2}</text>",
-                width - 205.0,
-                width - 185.0,
-                width - 178.0,
+                width - 245.0,
+                width - 225.0,
+                width - 218.0,
                 at + 4.0,
                 slope(series, &of)
             );
@@ -220,7 +220,7 @@ fn plot(lines: &[Line], title: &str, of: impl Fn(&Line) -> f64) -> String {
     let _ = writeln!(
         svg,
         "<text x=\"{}\" y=\"{}\">full: {first_law}, dashed: {other}</text>",
-        width - 205.0,
+        width - 245.0,
         50.0 + 20.0 * elements.len() as f64
     );
     svg + "</svg>\n"
