@@ -90,6 +90,7 @@ fn partials(op: &Op, values: &[f64], v: f64) -> Vec<(ValueId, f64)> {
 mod tests {
     use super::*;
     use crate::evaluate::textbook;
+    use crate::gate::{Machine, Quantity, Reference};
     use crate::material::Material;
     use crate::number::Exact;
     use crate::states::Random;
@@ -154,6 +155,40 @@ mod tests {
             // Roundings are less than a unit, by 1/sqrt(2) on average over the digits; functions may be off by two.
             let mean = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
             assert!((0.4..1.2).contains(&mean), "{}: {mean} of what is expected", entry.info.name);
+        }
+    }
+
+    /// Near rest a tangent's parts cancel most: by the textbook form the roundings of neo-Hookean laws' alone come to half
+    /// the gate, split to less than a third.
+    #[test]
+    fn tangents_near_rest_spend_little_of_the_gate() {
+        for entry in tensormass_kernels::laws() {
+            let subject = Subject::of_build(entry);
+            let derivation = &subject.derivation;
+            let dforce = derivation.kernel("dforce");
+            // Principal axes are found by rotations whose own derivatives mean nothing.
+            if dforce.ir().values.len() > 2000 {
+                continue;
+            }
+            for material in Material::all(&subject).expect("materials") {
+                let (exact, constants) = (material.exact_constants(derivation), material.constants(derivation));
+                let zero = [0.0; 9].map(Exact::from);
+                let rest = [(Input::Constants, &exact[..]), (Input::DisplacementGradient, &zero[..])];
+                let rest = textbook(derivation, "energy", &rest).value.remove(0);
+                for k in 0..6 {
+                    let mut random = Random::new(&[7, k as u64]);
+                    let (g, d) = (random.gradient(1e-3, 0.0, k), random.direction());
+                    let Some(reference) = Reference::new(derivation, &exact, &rest, &g, &d) else { continue };
+                    let bound = reference.bound(Machine::F64, Quantity::DP).to_f64() / Machine::F64.round_off();
+                    let inputs = [
+                        (Input::Constants, &constants[..]),
+                        (Input::DisplacementGradient, &g[..]),
+                        (Input::GradientIncrement, &d[..]),
+                    ];
+                    let part = expected(&roundings(dforce, &inputs).expect("its inputs")) / bound;
+                    assert!(part <= 0.4, "{}, state {k}: {part:.2} of the gate", entry.info.name);
+                }
+            }
         }
     }
 }

@@ -4,8 +4,8 @@
 Usage: read_vtu.py DIR      (needs: pip install pyvista)
 
 Prints points, cells and arrays of each frame that DIR/frames.pvd lists. Exit status 1 and one line for each fault if a
-frame is missing, does not read, is not all tetrahedra, or if its points and cells are not the summary's "nodes" and
-"elements"; 2 if DIR is not given.
+frame is missing, does not read, has cells that VTK finds invalid or whose volume at rest is not positive, or if its points
+and cells are not the summary's "nodes" and "elements"; 2 if DIR is not given.
 """
 
 import json
@@ -15,8 +15,7 @@ import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 import pyvista
-
-VTK_TETRA = 10
+from vtkmodules.vtkFiltersGeneral import vtkCellValidator
 
 
 def frames(folder):
@@ -48,10 +47,14 @@ def check(path, nodes, elements):
         faults.append(f"{path}: {mesh.n_points} points, the summary has {nodes} nodes")
     if mesh.n_cells != elements:
         faults.append(f"{path}: {mesh.n_cells} cells, the summary has {elements} elements")
-    if not np.all(mesh.celltypes == VTK_TETRA):
-        faults.append(f"{path}: cells other than tetrahedra")
-    elif mesh.n_cells and not np.all(mesh.compute_cell_sizes()["Volume"] > 0):
-        # Points are rest positions, so that a negative volume means a wrong connectivity.
+    # Points are rest positions, so that faces that point inwards or a negative volume mean a wrong connectivity.
+    validator = vtkCellValidator()
+    validator.SetInputData(mesh)
+    validator.Update()
+    states = pyvista.wrap(validator.GetOutput()).cell_data["ValidityState"]
+    if np.any(states != 0):
+        faults.append(f"{path}: cells that VTK finds invalid, in states {sorted(set(states.tolist()))}")
+    if mesh.n_cells and not np.all(mesh.compute_cell_sizes()["Volume"] > 0):
         faults.append(f"{path}: cells without a positive volume")
     if not np.all(np.isfinite(mesh.points)):
         faults.append(f"{path}: points that are not finite")

@@ -22,17 +22,23 @@ fn parts(shape: &str) -> Option<Vec<[Corner; 4]>> {
         "hexahedron" => vec![[0, 1, 2, 4]],
         // Cut along the diagonal of its lower side, as tetrahedra are.
         "prism" => vec![[0, 1, 3, 4], [0, 3, 2, 4]],
+        "quadrangle" => vec![[0, 1, 2, 4]],
+        "triangle" => vec![[0, 1, 3, 4], [0, 3, 2, 4]],
         _ => return None,
     })
 }
 
 /// A point of a part in cell coordinates from 0 to 1.
-fn in_cell(shape: &str, part: &[Corner; 4], reference: &[f64; 3]) -> [f64; 3] {
+fn in_cell(info: &ElementInfo, part: &[Corner; 4], reference: &[f64; 3]) -> [f64; 3] {
     let corner = |c: Corner| [0, 1, 2].map(|axis| (c >> axis & 1) as f64);
-    let from_zero = |axis: usize| shape == "tetrahedron" || (shape == "prism" && axis < 2);
+    let from_zero = |axis: usize| match info.shape {
+        "tetrahedron" | "triangle" => true,
+        "prism" => axis < 2,
+        _ => false,
+    };
     let origin = corner(part[0]);
     let mut x = origin;
-    for (axis, unit) in part[1..].iter().enumerate() {
+    for (axis, unit) in part[1..].iter().enumerate().take(info.dimension) {
         let t = if from_zero(axis) { reference[axis] } else { 0.5 * (1.0 + reference[axis]) };
         for (i, (x, end)) in x.iter_mut().zip(corner(*unit)).enumerate() {
             *x += t * (end - origin[i]);
@@ -53,13 +59,14 @@ pub fn beam(size: [f64; 3], cells: [usize; 3], origin: [f64; 3]) -> Result<Mesh,
 }
 
 /// A box of `size` (m) with its lowest corner at `origin` (m), in `cells` cells of elements of one kind: six tetrahedra,
-/// one hexahedron or two prisms each.
+/// one hexahedron or two prisms each. Of plane elements, two triangles or one quadrangle each, a rectangle at z = 0, whose
+/// thickness is 1 m in one cell.
 ///
 /// Nodes are numbered by their place, x before y before z; elements follow their cells in the same order. Groups as
 /// [`beam`] has them.
 ///
 /// # Errors
-/// [`MeshError`] if cells cannot be made of the element, an axis has no cells, a size is not positive and finite, the
+/// [`MeshError`] if cells cannot be made of the element, a plane body is not one metre thick, an axis has no cells, a size is not positive and finite, the
 /// origin is not finite, the cells are too many to number, or so thin (1e14 times longer than wide) that they are
 /// degenerate.
 pub fn beam_of(
@@ -82,6 +89,9 @@ pub fn beam_of(
     let info = element.info;
     let cell = Cell::of(info).ok_or(MeshError::BeamElement { element: info.name })?;
     let lattice = cell.lattice(cells).ok_or(MeshError::BeamTooLarge { cells, limit: Mesh::MAX_SLOTS / info.nodes })?;
+    if info.dimension == 2 && (size[2], cells[2]) != (1.0, 1) {
+        return Err(MeshError::BeamThickness { size: size[2], cells: cells[2] });
+    }
     let [nx, ny, nz] = cells;
 
     // Which places of the lattice have a node, and then its number.
@@ -106,7 +116,10 @@ pub fn beam_of(
             }
         }
     }
-    let coordinate = |axis: usize, i: usize| origin[axis] + size[axis] * i as f64 / (lattice[axis] - 1) as f64;
+    let coordinate = |axis: usize, i: usize| match lattice[axis] {
+        1 => origin[axis],
+        places => origin[axis] + size[axis] * i as f64 / (places - 1) as f64,
+    };
     let nodes: Vec<[f64; 3]> = places.iter().map(|x| std::array::from_fn(|axis| coordinate(axis, x[axis]))).collect();
     let mut block = Block { element, nodes: vec![] };
     for cell_at in each_cell() {
@@ -123,6 +136,8 @@ struct Cell {
     refined: usize,
     /// The lattice places of the nodes of each element.
     parts: Vec<Vec<[usize; 3]>>,
+    /// 3, or 2 of a rectangle.
+    dimension: usize,
 }
 
 /// The finest lattice on which the nodes of an element may lie.
@@ -132,22 +147,26 @@ impl Cell {
     fn of(info: &ElementInfo) -> Option<Self> {
         let parts: Vec<Vec<[f64; 3]>> = parts(info.shape)?
             .iter()
-            .map(|part| info.reference.iter().map(|x| in_cell(info.shape, part, x)).collect())
+            .map(|part| info.reference.iter().map(|x| in_cell(info, part, x)).collect())
             .collect();
         let refined = (1..=FINEST).find(|m| {
             let on_lattice = |x: &f64| (x * *m as f64 - (x * *m as f64).round()).abs() < 1e-9;
             parts.iter().flatten().flatten().all(on_lattice)
         })?;
         let place = |x: &[f64; 3]| x.map(|x| (x * refined as f64).round() as usize);
-        Some(Self { refined, parts: parts.iter().map(|part| part.iter().map(place).collect()).collect() })
+        Some(Self {
+            refined,
+            parts: parts.iter().map(|part| part.iter().map(place).collect()).collect(),
+            dimension: info.dimension,
+        })
     }
 
     /// The places along each axis, if nodes and slots can be numbered.
     fn lattice(&self, cells: [usize; 3]) -> Option<[usize; 3]> {
         let slots_of_cell = self.parts.iter().map(Vec::len).sum::<usize>();
         let slots = cells.iter().try_fold(slots_of_cell, |product, n| product.checked_mul(*n))?;
-        let mut lattice = [0; 3];
-        for (places, n) in lattice.iter_mut().zip(cells) {
+        let mut lattice = [1; 3];
+        for (places, n) in lattice.iter_mut().zip(cells).take(self.dimension) {
             *places = n.checked_mul(self.refined)?.checked_add(1)?;
         }
         let all = lattice.iter().try_fold(1_usize, |product, n| product.checked_mul(*n))?;
@@ -155,11 +174,11 @@ impl Cell {
     }
 }
 
-/// The six sides, found by lattice coordinates: exact, whatever the size and the origin.
+/// The six sides, or the four of a rectangle, found by lattice coordinates: exact, whatever the size and the origin.
 fn sides(block: &Block, places: &[[usize; 3]], lattice: [usize; 3]) -> Groups {
     let mut groups = Groups::default();
     let mut named: BTreeMap<(usize, usize), String> = BTreeMap::new();
-    for (axis, name) in AXES.into_iter().enumerate() {
+    for (axis, name) in AXES.into_iter().enumerate().take(block.info().dimension) {
         for (end, place) in [("min", 0), ("max", lattice[axis] - 1)] {
             let nodes = (0..places.len()).filter(|n| places[*n][axis] == place).map(|n| NodeId(n as u32)).collect();
             groups.nodes.insert(format!("{name}{end}"), nodes);

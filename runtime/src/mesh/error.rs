@@ -199,10 +199,20 @@ pub enum MeshError {
         face: Vec<NodeId>,
     },
     /// A beam of elements that make no cell.
-    #[error("a beam cannot be made of `{element}`; take an element that is a tetrahedron, a hexahedron or a prism")]
+    #[error("a beam cannot be made of `{element}`; take a solid element, or a plane one for a rectangle")]
     BeamElement {
         /// The element.
         element: &'static str,
+    },
+    /// A rectangle of another thickness than one metre, or of several cells across it.
+    #[error(
+        "a rectangle of plane elements is one metre thick, not {size} m in {cells} cells; give size 1 and 1 cell along z"
+    )]
+    BeamThickness {
+        /// What was given, m.
+        size: f64,
+        /// What was given.
+        cells: usize,
     },
     /// A beam with no cells along an axis.
     #[error("the beam has no cells along {axis}; give at least 1")]
@@ -258,6 +268,7 @@ impl MeshError {
             | MeshError::GroupIndex { .. }
             | MeshError::FaceNotInMesh { .. }
             | MeshError::BeamElement { .. }
+            | MeshError::BeamThickness { .. }
             | MeshError::BeamCells { .. }
             | MeshError::BeamSize { .. }
             | MeshError::BeamOrigin { .. }
@@ -283,6 +294,7 @@ impl MeshError {
             | MeshError::GroupIndex { .. }
             | MeshError::FaceNotInMesh { .. }
             | MeshError::BeamElement { .. }
+            | MeshError::BeamThickness { .. }
             | MeshError::BeamCells { .. }
             | MeshError::BeamSize { .. }
             | MeshError::BeamOrigin { .. }

@@ -33,7 +33,8 @@ pub fn loads(
                 let traction = value.map(|t| t / scale.stress);
                 for face in faces {
                     let nodes = mesh.face_nodes(face);
-                    let unit = scale.length.powi(mesh.face_kind(face).dimension as i32);
+                    // Edges of a plane body are areas, one metre high.
+                    let unit = scale.length * scale.length;
                     for (n, integral) in
                         nodes.iter().zip(mesh::integrals(mesh.face_kind(face), &mesh.positions(&nodes)))
                     {

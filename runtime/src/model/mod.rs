@@ -124,11 +124,10 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
 /// The quadrature points of all elements, in scaled lengths.
 fn scaled_rest(mesh: &Mesh, length: f64) -> Rows<RestPoint<f64>> {
     let of = |e| {
-        // Powers of two: scaling rounds nothing. Plane bodies are one metre thick.
-        let dimension = mesh.kind(e).info.dimension as i32;
+        // Powers of two: scaling rounds nothing. Plane bodies are one metre thick: theirs are volumes too.
         let scale = move |p: RestPoint<f64>| RestPoint {
             inverse_jacobian: p.inverse_jacobian.map(|x| x * length),
-            weight: p.weight / length.powi(dimension),
+            weight: p.weight / length.powi(3),
         };
         mesh.rest(e).into_iter().map(scale)
     };
@@ -165,8 +164,8 @@ fn load_mesh(scene: &Scene, warnings: &mut Vec<String>) -> Result<Mesh, BuildErr
 /// The element of a generated mesh.
 fn find_element(scene: &Scene, name: &str) -> Result<&'static ElementEntry, SceneError> {
     tensormass_kernels::element(name).ok_or_else(|| {
-        let solid = tensormass_kernels::elements().iter().filter(|e| e.info.dimension == 3);
-        let names: Vec<&str> = solid.map(|e| e.info.name).collect();
+        let bodies = tensormass_kernels::elements().iter().filter(|e| e.info.dimension > 1);
+        let names: Vec<&str> = bodies.map(|e| e.info.name).collect();
         SceneError::at(
             scene.locate("mesh.beam.element"),
             format!("there is no element \"{name}\""),

@@ -75,7 +75,8 @@ pub enum Mesh {
     },
 }
 
-/// A rectangular beam with its edges along the axes: cells are boxes, each of 6 tetrahedra, 1 hexahedron or 2 prisms.
+/// A rectangular beam with its edges along the axes: cells are boxes, each of 6 tetrahedra, 1 hexahedron or 2 prisms; of
+/// plane elements a rectangle of 1 m thickness, each cell 2 triangles or 1 quadrangle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Beam {
@@ -89,7 +90,7 @@ pub struct Beam {
     #[serde(default)]
     #[schemars(inner(range(min = -1e6, max = 1e6)))]
     pub origin: [f64; 3],
-    /// What the cells are made of: `tetrahedron_p1`, or another solid element of the build.
+    /// What the cells are made of: `tetrahedron_p1`, or another solid or plane element of the build.
     #[serde(default = "linear")]
     #[schemars(length(min = 1))]
     pub element: String,

@@ -2,7 +2,7 @@
 #![allow(dead_code)] // every test links its own copy and uses a part of it
 
 use tensormass_kernels::{ElementEntry, ElementInfo, elements};
-use tensormass_runtime::mesh::{Block, Groups, Mesh, NodeId, beam_of};
+use tensormass_runtime::mesh::{Mesh, NodeId, beam_of};
 use tensormass_testing::codegen::element::{ElementDeclaration, Shape, declarations};
 
 use super::Random;
@@ -14,28 +14,8 @@ pub fn of_dimension(dimension: usize) -> impl Iterator<Item = &'static ElementEn
 
 /// The unit cube, or the unit square, in n cells along each side.
 pub fn unit(element: &'static ElementEntry, n: usize) -> Mesh {
-    if element.info.dimension == 3 {
-        return beam_of(element, [1.0; 3], [n; 3], [0.0; 3]).unwrap_or_else(|e| panic!("{e}"));
-    }
-    // A side of a cube of the solid elements whose faces are this element.
-    let solid = of_dimension(3).find(|solid| {
-        let mut faces = solid.info.faces.iter();
-        solid.info.shape != "prism" && faces.any(|face| face.element == element.info.name)
-    });
-    let cube = unit(solid.unwrap_or_else(|| panic!("{} is no face", element.info.name)), n);
-    // Seen from outside, x runs to the right and y up.
-    let side = cube.face_group("zmax").expect("a beam has sides");
-    let mut numbers = std::collections::BTreeMap::new();
-    let (mut nodes, mut block) = (vec![], Block { element, nodes: vec![] });
-    for node in side.iter().flatten() {
-        let number = *numbers.entry(*node).or_insert_with(|| {
-            let [x, y, _] = cube.nodes()[node.index()];
-            nodes.push([x, y, 0.0]);
-            NodeId(nodes.len() as u32 - 1)
-        });
-        block.nodes.push(number);
-    }
-    Mesh::new(nodes, vec![block], Groups::default()).unwrap_or_else(|e| panic!("{e}"))
+    let thick = if element.info.dimension == 3 { n } else { 1 };
+    beam_of(element, [1.0; 3], [n, n, thick], [0.0; 3]).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// The two corners between which each node lies, or the node itself twice; a corner is a node of the linear element.
