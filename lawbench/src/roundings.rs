@@ -158,8 +158,8 @@ mod tests {
         }
     }
 
-    /// Near rest a tangent's parts cancel most: by the textbook form the roundings of neo-Hookean laws' alone come to half
-    /// the gate, split to less than a third.
+    /// Near rest a tangent's parts cancel most: the more, the steeper the energy is in J. Tangents that are steep are split
+    /// there, and none has to spend much more than half of the gate.
     #[test]
     fn tangents_near_rest_spend_little_of_the_gate() {
         for entry in tensormass_kernels::laws() {
@@ -186,7 +186,7 @@ mod tests {
                         (Input::GradientIncrement, &d[..]),
                     ];
                     let part = expected(&roundings(dforce, &inputs).expect("its inputs")) / bound;
-                    assert!(part <= 0.4, "{}, state {k}: {part:.2} of the gate", entry.info.name);
+                    assert!(part <= 0.6, "{}, state {k}: {part:.2} of the gate", entry.info.name);
                 }
             }
         }

@@ -35,6 +35,8 @@ pub struct Energy<'a> {
     known: HashMap<*const ScalarNode, Expr>,
     /// The comparisons of the law's selections.
     pub conditions: Vec<(Expr, Expr)>,
+    /// Whether a broken power of J multiplies what depends on the strain.
+    pub isochoric: bool,
     /// The tensor in which finite strains are expressed.
     finite: Base,
 }
@@ -64,7 +66,7 @@ impl<'a> Energy<'a> {
         strain: &'a mut Strain,
     ) -> Self {
         let (known, finite) = (HashMap::new(), Base::A);
-        Self { cas, quantities, strain, parameters, known, conditions: vec![], finite }
+        Self { cas, quantities, strain, parameters, known, conditions: vec![], isochoric: false, finite }
     }
 
     /// The declared ranges, by the parameters' symbols.
@@ -217,6 +219,7 @@ impl<'a> Energy<'a> {
         let j = j.expect("a power of it was found");
         partials.push((j, r * stage.into() * Expr::from(j).pow(Rational::from_integer(-1))));
         self.quantities.differentiate_by(stage, partials);
+        self.isochoric = true;
         Ok(stage.into())
     }
 

@@ -81,6 +81,8 @@ struct Session {
     far_margin: Option<Expr>,
     /// The comparisons of the law's selections.
     conditions: Vec<(Expr, Expr)>,
+    /// Whether the tangent is split at rest: see [`Session::is_steep`].
+    splits_tangent: bool,
     /// The symbols of the parameters' components, parameter by parameter.
     parameters: Vec<Vec<Symbol>>,
 }
@@ -103,6 +105,7 @@ impl Session {
         let others = others.iter().map(|e| reader.scalar(e)).collect::<Result<Vec<Expr>, _>>()?;
         let ranges = reader.ranges(law);
         let conditions = std::mem::take(&mut reader.conditions);
+        let splits_tangent = reader.isochoric;
         let parameters = reader.parameters.clone();
         reader.far_from_rest();
         let far_energy = reader.scalar(&law.energy)?;
@@ -114,7 +117,7 @@ impl Session {
         let far_margin = far_margin.map(|m| cas.normalize(&m)).transpose()?;
         let margin = margin.map(|m| cas.normalize(&m)).transpose()?;
         let energy = cas.normalize(&energy)?;
-        let session = Self {
+        let mut session = Self {
             cas,
             quantities,
             constants: Constants::default(),
@@ -125,8 +128,10 @@ impl Session {
             far_energy,
             far_margin,
             conditions,
+            splits_tangent,
             parameters,
         };
+        session.splits_tangent |= session.is_steep(&session.energy);
         Ok((session, others))
     }
 
@@ -179,8 +184,10 @@ impl Session {
             None => point.push(self.lower("force", &[G], with_margin(Output::Stress, stress.to_vec(), &margin))),
         }
         let near_increment = match &near_stress {
-            Some(near) => Some((self.near_increment(near, &dgradient)?, near.tangent_holds.clone())),
-            None => None,
+            Some(near) if self.splits_tangent => {
+                Some((self.near_increment(near, &dgradient)?, near.tangent_holds.clone()))
+            }
+            _ => None,
         };
         // Of every selection that the tangents have made.
         let accurate = self.accurate()?;
@@ -293,6 +300,9 @@ impl Session {
                 self.quantities.stage(name, w).into()
             };
             if !w.is_zero() {
+                // 3 + tr A in its differential would lose tr C far from rest.
+                self.splits_tangent |=
+                    invariant == Invariant::Trace(Invariant::OF_C) && !self.quantities.is_constant_expr(&w);
                 weights.push((invariant, q, w));
             }
         }

@@ -20,6 +20,9 @@ const GREATEST_VOLUME: (i128, i128) = (4, 1);
 /// Tangents, whose second derivatives by J are split too: with J^-n of them little is left soon.
 const GREATEST_TANGENT: (i128, i128) = (5, 4);
 
+/// The order of a power of J from which on a tangent's roundings come near the gate.
+const STEEP: u128 = 3;
+
 /// Pairs of a quantity and what is computed for it.
 pub type StandIns = Vec<(Symbol, Symbol)>;
 
@@ -156,6 +159,28 @@ impl Session {
         let holds = self.near_rest(j.clone(), bounded, (!bounded).then_some(GREATEST_VOLUME))?;
         let tangent_holds = self.near_rest(j, bounded, Some(GREATEST_TANGENT))?;
         Ok(Some(NearStress { stress, margin, cauchy, holds, tangent_holds, split }))
+    }
+
+    /// Whether an energy has a power of J whose second derivative is of third order or more, or is broken: such a tangent
+    /// takes the rounding of J three times and more, most of what the gate grants. Any other is as accurate as it stands,
+    /// and cheaper: so are those of ln J and of J^2.
+    pub(super) fn is_steep(&self, e: &Expr) -> bool {
+        let each = |xs: &[Expr]| xs.iter().any(|x| self.is_steep(x));
+        match e {
+            Expr::Number(_) | Expr::Symbol(_) => false,
+            Expr::Sum(xs) | Expr::Product(xs) => each(xs),
+            Expr::Power(base, exponent) => {
+                let of_volume = self.strain.used(Invariant::J).is_some_and(|j| base.symbols().contains(&j));
+                // A power of a parameter's choice is broken, too.
+                let is_steep = match &**exponent {
+                    Expr::Number(n) if n.is_integer() => (*n.numer() - 2).unsigned_abs() >= STEEP,
+                    _ => true,
+                };
+                (of_volume && is_steep) || self.is_steep(base) || self.is_steep(exponent)
+            }
+            Expr::Ln(a) | Expr::Exp(a) => self.is_steep(a),
+            Expr::Log1p(a) | Expr::Expm1(a) | Expr::Log1pmx(a) | Expr::Expm1mx(a) => self.is_steep(a),
+        }
     }
 
     /// The differential of the stress from its form near rest, and pairs of quantities and what to compute for them.
