@@ -159,15 +159,17 @@ mod tests {
     }
 
     /// Near rest a tangent's parts cancel most: the more, the steeper the energy is in J. Tangents that are steep are split
-    /// there, and none has to spend much more than half of the gate.
+    /// there, to what the others spend at the most, which is two thirds of the gate.
     #[test]
     fn tangents_near_rest_spend_little_of_the_gate() {
         for entry in tensormass_kernels::laws() {
             let subject = Subject::of_build(entry);
             let derivation = &subject.derivation;
-            let dforce = derivation.kernel("dforce");
+            let point = derivation.point("dforce");
+            let dforce = point.near;
+            let (mut spent, mut unsplit) = (0.0_f64, 0.0_f64);
             // Principal axes are found by rotations whose own derivatives mean nothing.
-            if dforce.ir().values.len() > 2000 {
+            if dforce.ir().values.len() > 1000 {
                 continue;
             }
             for material in Material::all(&subject).expect("materials") {
@@ -185,10 +187,18 @@ mod tests {
                         (Input::DisplacementGradient, &g[..]),
                         (Input::GradientIncrement, &d[..]),
                     ];
-                    let part = expected(&roundings(dforce, &inputs).expect("its inputs")) / bound;
-                    assert!(part <= 0.6, "{}, state {k}: {part:.2} of the gate", entry.info.name);
+                    let part = |kernel| expected(&roundings(kernel, &inputs).expect("its inputs")) / bound;
+                    spent = spent.max(part(dforce));
+                    unsplit = unsplit.max(point.far.map_or(0.0, part));
                 }
             }
+            let name = entry.info.name;
+            println!("{name}: {spent:.2} of the gate, {unsplit:.2} unsplit");
+            assert!(spent <= 2.0 / 3.0, "{name}: {spent:.2} of the gate");
+            assert!(
+                point.far.is_none() || spent < 0.8 * unsplit,
+                "{name}: {spent:.2} of the gate, {unsplit:.2} unsplit"
+            );
         }
     }
 }
