@@ -11,37 +11,8 @@ mod support;
 
 use elements::of_dimension;
 use manufactured::solve;
-use support::{Random, body, done, parameters, probe, scene, system};
+use support::{CANTILEVER, Random, body, done, parameters, probe, scene, system};
 use tensormass_runtime::laws;
-
-const BEAM: &str = r#"
-[mesh]
-beam = { size = [10, 1, 1], cells = [20, 2, 2] }
-
-[[material]]
-law = "hooke"
-density = 1000.0
-parameters = { young = 1e6, poisson = 0.3 }
-
-[[boundary]]
-nodes = "near(x, xmin)"
-fix = ["x", "y", "z"]
-
-[[load]]
-kind = "traction"
-faces = "near(x, xmax)"
-value = [0.0, 0.0, 1.0]
-
-[solver]
-integrator = "static"
-precision = "f64"
-cg = { tolerance = 1e-10, max_iterations = 20000 }
-
-[[probe]]
-name = "work"
-kind = "energy"
-part = "external"
-"#;
 
 fn main() {
     let linear = laws().iter().find(|l| l.info.structure.linear).expect("a linear law");
@@ -74,7 +45,7 @@ fn main() {
                 format!("mesh.beam.cells=[{}, {across}, {across}]", 10 * across),
                 format!("mesh.beam.element=\"{}\"", element.info.name),
             ];
-            let outcome = done(&scene(BEAM, &set));
+            let outcome = done(&scene(CANTILEVER, &set));
             let unknowns = outcome.summary["nodes"].as_u64().expect("a count") * 3;
             let tip = -probe(&outcome, "work");
             println!("cantilever,{},{},hooke,{across},{unknowns},{tip:e},0", element.info.name, element.info.order);

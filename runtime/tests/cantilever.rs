@@ -7,53 +7,13 @@
 
 mod support;
 
-use support::{case, done, number, probe, relative, scene};
-
-const BEAM: &str = r#"
-[mesh]
-beam = { size = [10, 1, 1], cells = [20, 2, 2] }
-
-[[material]]
-law = "hooke"
-density = 1000.0
-parameters = { young = 1e6, poisson = 0.3 }
-
-[[boundary]]
-nodes = "near(x, xmin)"
-fix = ["x", "y", "z"]
-
-[[load]]
-kind = "traction"
-faces = "near(x, xmax)"
-value = [0.0, 0.0, 1.0]
-
-[solver]
-integrator = "static"
-precision = "f64"
-cg = { tolerance = 1e-11, max_iterations = 5000 }
-
-[[probe]]
-name = "nodes"
-kind = "displacement"
-nodes = "near(x, xmax)"
-component = "z"
-
-[[probe]]
-name = "work"
-kind = "energy"
-part = "external"
-
-[[probe]]
-name = "elastic"
-kind = "energy"
-part = "elastic"
-"#;
+use support::{CANTILEVER, case, done, number, probe, relative, scene};
 
 fn check(cells: [u32; 3]) {
     let case = case("CANTI_SMALL");
     let [nx, ny, nz] = cells;
     let wanted = number(&case["expected"]["fem"][format!("P1_Kuhn_lumped_{nx}x{ny}x{nz}")]["tip_avg"]);
-    let outcome = done(&scene(BEAM, &[format!("mesh.beam.cells={cells:?}")]));
+    let outcome = done(&scene(CANTILEVER, &[format!("mesh.beam.cells={cells:?}")]));
     let (nodes, area) = (probe(&outcome, "nodes"), -probe(&outcome, "work"));
     let products = &outcome.summary["solver"]["tangent_products"];
     println!(

@@ -16,6 +16,52 @@ use tensormass_runtime::scene::{self, Override, Scene};
 use tensormass_runtime::simulate::{Ending, Outcome, Silent, run};
 use tensormass_runtime::system::System;
 
+/// The end-loaded cantilever CANTI_SMALL; its tip's mean deflection is minus the probe `work`.
+pub const CANTILEVER: &str = r#"
+[mesh]
+beam = { size = [10, 1, 1], cells = [20, 2, 2] }
+
+[[material]]
+law = "hooke"
+density = 1000.0
+parameters = { young = 1e6, poisson = 0.3 }
+
+[[boundary]]
+nodes = "near(x, xmin)"
+fix = ["x", "y", "z"]
+
+[[load]]
+kind = "traction"
+faces = "near(x, xmax)"
+value = [0.0, 0.0, 1.0]
+
+[solver]
+integrator = "static"
+precision = "f64"
+cg = { tolerance = 1e-11, max_iterations = 20000 }
+
+[[probe]]
+name = "nodes"
+kind = "displacement"
+nodes = "near(x, xmax)"
+component = "z"
+
+[[probe]]
+name = "work"
+kind = "energy"
+part = "external"
+
+[[probe]]
+name = "elastic"
+kind = "energy"
+part = "elastic"
+
+[[probe]]
+name = "volume"
+kind = "volume"
+elements = "all"
+"#;
+
 /// A system on the CPU.
 pub type Cpu<R> = System<CpuBackend<R>, CpuField<R>>;
 
