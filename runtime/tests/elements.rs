@@ -349,6 +349,12 @@ elements = "all"
 fn strain_is_plane_in_two_dimensions() {
     let file = support::repository("runtime/tests/data/plane_4.msh");
     let set = [format!("mesh.file={:?}", file.to_str().expect("UTF-8"))];
+    // What holds a plane body along z is no support.
+    let (head, tail) = PLANE.split_once("[[boundary]]").expect("supports");
+    let (_, tail) = tail.split_once("[[load]]").expect("loads");
+    let unsupported = tensormass_runtime::model::build(&scene(&format!("{head}[[load]]{tail}"), &set));
+    let error = unsupported.err().map(|e| e.to_string()).unwrap_or_default();
+    assert!(error.contains("static equilibrium needs supports"), "{error}");
     let outcome = done(&scene(PLANE, &set));
     let (young, poisson, pull, length) = (1e6, 0.3, 1000.0, 2.0);
     let wanted = length * pull * (1.0 - poisson * poisson) / young;

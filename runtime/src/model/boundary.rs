@@ -24,10 +24,7 @@ pub fn constraints(
         let nodes = places.nodes(scene, &path, boundary.nodes())?;
         for (component, history) in histories(boundary) {
             let history = history.scaled(1.0 / scale.time, 1.0 / scale.length);
-            let motion = motions.iter().position(|m| *m == history).unwrap_or_else(|| {
-                motions.push(history);
-                motions.len() - 1
-            });
+            let motion = number_of(history, &mut motions);
             for &node in &nodes {
                 match found.insert((node, component), (motion, i)) {
                     Some((other, first)) if other != motion => {
@@ -49,11 +46,7 @@ pub fn constraints(
     }
     // Strain is plane: elements of two dimensions resist nothing along z.
     if mesh.blocks()[0].info().dimension == 2 {
-        let still = History::constant(0.0);
-        let motion = motions.iter().position(|m| *m == still).unwrap_or_else(|| {
-            motions.push(still);
-            motions.len() - 1
-        });
+        let motion = number_of(History::constant(0.0), &mut motions);
         for node in 0..mesh.nodes().len() as u32 {
             found.entry((node, 2)).or_insert((motion, 0));
         }
@@ -61,6 +54,14 @@ pub fn constraints(
     let constraints =
         found.into_iter().map(|((node, component), (motion, _))| Constraint { node, component, motion }).collect();
     Ok((constraints, motions))
+}
+
+/// The place of a history among those that are known; it is added if need be.
+fn number_of(history: History, motions: &mut Vec<History>) -> usize {
+    motions.iter().position(|m| *m == history).unwrap_or_else(|| {
+        motions.push(history);
+        motions.len() - 1
+    })
 }
 
 fn histories(boundary: &Boundary) -> Vec<(u8, History)> {

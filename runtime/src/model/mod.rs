@@ -85,7 +85,9 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
         rest.iter().zip(densities).map(|(points, d)| points.iter().map(|p| p.weight).sum::<f64>() * d).collect();
     let batches = assignment.batches(&mesh, &scale);
     let (constraints, motions) = boundary::constraints(scene, &mesh, &places, &scale)?;
-    if constraints.is_empty() && scene.solver.integrator == scene::Integrator::Static {
+    // Plane bodies are held along z whatever a scene says.
+    let supported = !scene.boundary.is_empty() && !constraints.is_empty();
+    if !supported && scene.solver.integrator == scene::Integrator::Static {
         return Err(SceneError::at(
             scene.locate("solver.integrator"),
             "static equilibrium needs supports, but no displacement is imposed",
