@@ -7,25 +7,26 @@
 
 use std::collections::HashSet;
 
-use tensormass_kernels::laws;
+use tensormass_kernels::shader::{PASSES, element_pass, node_product, node_sum};
+use tensormass_kernels::{ElementEntry, LawEntry, element, laws, linear_tetrahedron};
 use tensormass_testing::codegen::derivation::Derivation;
 use tensormass_testing::codegen::element::{ElementKernels, kernels, tetrahedron_p1};
 use tensormass_testing::codegen::ir::{Input, ValidKernel};
 use tensormass_testing::codegen::law;
-use tensormass_testing::codegen::print::{rust, wgsl};
+use tensormass_testing::codegen::print::rust;
 use tensormass_testing::{derivation, root};
 
 /// Add + mul + div an element of the literature's best hand-written or staged kernels (Force, DForce with G recomputed).
 const REACHED: [(&str, u32, u32); 3] =
     [("hooke", 121, 121), ("st_venant_kirchhoff", 200, 372), ("neo_hookean", 172, 326)];
 
-fn element() -> ElementKernels {
+fn fused() -> ElementKernels {
     kernels(&tetrahedron_p1()).expect("the element is well-formed")
 }
 
 /// Force and DForce on one element: gather, point kernel, contract.
 fn element_counts(d: &Derivation) -> (u32, u32) {
-    let element = element();
+    let element = fused();
     let count = |k: &ValidKernel| k.count().arithmetic();
     let around = count(&element.gradient) + count(&element.contract);
     let dforce = d.kernel("dforce");
@@ -42,14 +43,13 @@ fn check(name: &str, text: &str) {
     settings.bind(|| insta::assert_snapshot!(name, text));
 }
 
-/// The passes of a law for review: of each, the parts between empty lines that no earlier one has.
-fn passes(shaders: &[wgsl::Shader; 5], damping: Option<&[wgsl::Shader; 3]>) -> String {
+/// The passes of a law on an element for review: of each, the parts between empty lines that no earlier one has.
+fn passes(law: &LawEntry, element: &ElementEntry) -> String {
     let mut shown = HashSet::new();
     let mut out = String::new();
-    let damping = wgsl::DAMPING_NAMES.iter().zip(damping.into_iter().flatten());
-    for (name, shader) in wgsl::NAMES.iter().zip(shaders).chain(damping) {
-        out += &format!("// ---- {name}: binds {:?}\n\n", shader.bindings);
-        for part in shader.text.split("\n\n").filter(|part| shown.insert(*part)) {
+    for (pass, shader) in PASSES.iter().filter_map(|pass| Some((pass, element_pass(law, element, *pass)?))) {
+        out += &format!("// ---- {pass:?}: binds {:?}\n\n", shader.bindings);
+        for part in shader.text.split("\n\n").filter(|part| shown.insert(part.to_string())) {
             out += &format!("{}\n\n", part.trim_end());
         }
     }
@@ -70,15 +70,14 @@ fn each_reviewed_law() {
         let law = law::parse(&path, &text).expect("the build accepted it");
         let derivation = derivation(env!("TENSORMASS_GENERATED"), name);
         check(&format!("law_{name}"), &rust::format(rust::law_module(&law, &derivation, true)).expect("Rust"));
-        let damping = wgsl::damping_shaders(&law, &derivation, &element());
-        check(&format!("wgsl_{name}"), &passes(&wgsl::law_shaders(&law, &derivation, &element()), damping.as_ref()));
+        check(&format!("wgsl_{name}"), &passes(entry, linear_tetrahedron()));
     }
     eprintln!("skipped {unreviewed} unreviewed laws");
 }
 
 #[test]
 fn element_module() {
-    let element = element();
+    let element = fused();
     check("element_tetrahedron_p1", &rust::format(rust::element_module(&element)).expect("Rust"));
     let ir = [&element.gradient, &element.contract, &element.node_gradients].map(|k| k.ir().to_text());
     check("element_tetrahedron_p1_ir", &ir.join("\n"));
@@ -86,8 +85,15 @@ fn element_module() {
 
 #[test]
 fn node_passes() {
-    check("wgsl_node_sum", &wgsl::node_sum().text);
-    check("wgsl_node_product", &wgsl::node_product().text);
+    check("wgsl_node_sum", &node_sum().text);
+    check("wgsl_node_product", &node_product().text);
+}
+
+/// Passes of an element with several points: that of the plane is short.
+#[test]
+fn passes_over_points() {
+    let element = element("quadrangle_q1").expect("a shipped element");
+    check("wgsl_quadrangle_q1", &passes(&laws()[laws().len() / 2], element));
 }
 
 #[test]

@@ -1,8 +1,9 @@
 //! The generated WGSL: every law and pass is valid, within every device's limits, and binds what its `Shader` says.
 
-use tensormass_kernels::generated::{NODE_PRODUCT, NODE_SUM};
-use tensormass_kernels::laws;
-use tensormass_kernels::shader::Shader;
+use tensormass_kernels::shader::{
+    Argument, Binding, DampingFunctions, PASSES, Pass, PointFunction, Shader, element_pass, node_product, node_sum,
+};
+use tensormass_kernels::{DampingEntry, LawEntry, elements, laws};
 use tensormass_testing::codegen::print::wgsl::is_free;
 use tensormass_testing::wgsl;
 
@@ -29,12 +30,12 @@ fn declared(text: &str) -> impl Iterator<Item = &str> {
 }
 
 fn check(what: &str, shader: &Shader) {
-    let bound = match wgsl::check(shader.text) {
+    let bound = match wgsl::check(&shader.text) {
         Ok(bound) => bound,
         Err(refusal) => panic!("{what}: {refusal:?}\n{}", shader.text),
     };
     assert_eq!(bound.len(), shader.bindings.len(), "{what}: {bound:?} against {:?}", shader.bindings);
-    for (found, expected) in bound.iter().zip(shader.bindings) {
+    for (found, expected) in bound.iter().zip(&shader.bindings) {
         assert_eq!(found.name, snake_case(&format!("{expected:?}")), "{what}");
         assert_eq!(found.uniform, expected.is_uniform(), "{what}, {expected:?}: uniform");
         assert_eq!(found.written, expected.is_written(), "{what}, {expected:?}: written");
@@ -43,33 +44,51 @@ fn check(what: &str, shader: &Shader) {
     assert!(bound[0].uniform && bound[1..].iter().all(|b| !b.uniform), "{what}: the uniform is binding 0");
 }
 
+/// Elements of which bodies can be made: faces have no strain.
 #[test]
-fn element_passes_of_every_law() {
+fn passes_of_every_law_on_every_element() {
     for law in laws() {
-        let s = law.shaders;
-        let passes = [&s.energy, &s.force, &s.dforce, &s.diagonal, &s.cauchy];
-        for (name, shader) in ["energy", "force", "dforce", "diagonal", "cauchy"].iter().zip(passes) {
-            let what = format!("{}, {name}", law.info.name);
-            check(&what, shader);
-            for name in declared(shader.text) {
-                assert!(!is_free(name), "{what}: a value could be named like `{name}`");
-            }
-        }
-        let damping = law.damping.map(|d| [&d.shaders.damping, &d.shaders.ddamping, &d.shaders.diagonal]);
-        for (name, shader) in ["damping", "ddamping", "diagonal"].iter().zip(damping.into_iter().flatten()) {
-            let what = format!("{}, {name} of damping", law.info.name);
-            check(&what, shader);
-            for name in declared(shader.text) {
-                assert!(!is_free(name), "{what}: a value could be named like `{name}`");
+        for element in elements().iter().filter(|e| e.info.dimension > 1) {
+            for pass in PASSES {
+                let Some(shader) = element_pass(law, element, pass) else { continue };
+                let what = format!("{}, {}, {pass:?}", law.info.name, element.info.name);
+                check(&what, &shader);
+                for name in declared(&shader.text) {
+                    assert!(!is_free(name), "{what}: a value could be named like `{name}`");
+                }
             }
         }
     }
 }
 
+/// A damping that reads all there is leaves no buffer for the gate, and its pass keeps within the limits without.
+#[test]
+fn damping_that_reads_everything() {
+    let law = laws().iter().find(|law| law.damping.is_some()).expect("a law with a dissipation");
+    let damping = law.damping.expect("it was asked for");
+    let terms: Vec<String> = (0..9).map(|k| format!("c[0] * g[{k}] * gt[{k}] * dg[{k}]")).collect();
+    let (count, terms) = (law.info.constants.len(), terms.join(", "));
+    let tensors = "g: array<f32, 9>, gt: array<f32, 9>, dg: array<f32, 9>";
+    let text = format!(
+        "\nfn ddamping(c: array<f32, {count}>, {tensors}) -> array<f32, 9> {{\n    return array({terms});\n}}\n"
+    );
+    let arguments =
+        &[Argument::Constants, Argument::DisplacementGradient, Argument::GradientRate, Argument::GradientIncrement];
+    let ddamping = PointFunction { name: "ddamping", text: text.leak(), arguments, field: None };
+    let functions = Box::leak(Box::new(DampingFunctions { ddamping, ..*damping.functions }));
+    let law = LawEntry { damping: Some(DampingEntry { functions, ..damping }), ..*law };
+    for element in elements().iter().filter(|e| e.info.dimension > 1) {
+        let shader = element_pass(&law, element, Pass::DDamping).expect("the law has a dissipation");
+        check(&format!("damping that reads everything, {}", element.info.name), &shader);
+        assert_eq!(shader.bindings.len(), 9, "a uniform and eight buffers");
+        assert!(!shader.bindings.contains(&Binding::Gate));
+    }
+}
+
 #[test]
 fn node_passes() {
-    check("node_sum", &NODE_SUM);
-    check("node_product", &NODE_PRODUCT);
+    check("node_sum", &node_sum());
+    check("node_product", &node_product());
 }
 
 #[test]

@@ -5,9 +5,10 @@
 
 use std::sync::LazyLock;
 
-use tensormass_kernels::{LawEntry, laws};
+use tensormass_kernels::shader::PASSES;
+use tensormass_kernels::{LawEntry, elements, laws};
 use tensormass_testing::codegen::derivation::{Derivation, PointKernel};
-use tensormass_testing::codegen::element::{kernels, tetrahedron_p1};
+use tensormass_testing::codegen::element::{declarations, kernels};
 use tensormass_testing::codegen::ir::{Builder, Input, Number, Op, Output, Rational, Remainder, ValidKernel, ValueId};
 use tensormass_testing::codegen::print::wgsl;
 use tensormass_testing::derivation;
@@ -122,17 +123,9 @@ fn check_law(law: &LawEntry, ir: &Derivation, seed: u64) {
         (Input::NodeGradient, single(&rng.direction()[..3])),
         (Input::GradientRate, single(&rng.direction())),
     ];
-    let s = law.shaders;
-    for (name, shader) in
-        [("energy", s.energy), ("force", s.force), ("dforce", s.dforce), ("diagonal", s.diagonal), ("cauchy", s.cauchy)]
-    {
-        let what = format!("{}, {name}, seed {seed}", law.info.name);
-        check(&what, &Functions::parse(shader.text), ir.point(name), &inputs);
-    }
-    let Some(d) = law.damping.map(|d| d.shaders) else { return };
-    for (name, shader) in [("damping", d.damping), ("ddamping", d.ddamping), ("damping_diagonal", d.diagonal)] {
-        let what = format!("{}, {name}, seed {seed}", law.info.name);
-        check(&what, &Functions::parse(shader.text), ir.point(name), &inputs);
+    for function in PASSES.iter().filter_map(|pass| pass.function(law)) {
+        let what = format!("{}, {}, seed {seed}", law.info.name, function.name);
+        check(&what, &Functions::parse(function.text), ir.point(function.name), &inputs);
     }
 }
 
@@ -145,32 +138,24 @@ fn point_kernels_of_every_law() {
 }
 
 #[test]
-fn functions_of_the_element() {
-    let element = kernels(&tetrahedron_p1()).expect("the element is well-formed");
+fn functions_of_every_element() {
     let mut rng = Rng::new(1);
-    let mut random = |n: usize| (0..n.div_ceil(9)).flat_map(|_| rng.direction()).take(n).map(|x| x as f32).collect();
-    let (u, b, p, w): (Vec<f32>, _, _, _) = (random(12), random(9), random(9), random(1));
-    let displacement = (Input::NodalDisplacement, u);
-    let (shape, stress, weight) = ((Input::ShapeGradients, b), (Input::StressIn, p), (Input::Weight, w));
-    let mut found = [0; 3];
-    for law in laws() {
-        for shader in [law.shaders.force, law.shaders.diagonal] {
-            let functions = Functions::parse(shader.text);
-            let cases = [
-                (&element.gradient, vec![displacement.clone(), shape.clone()]),
-                (&element.contract, vec![stress.clone(), shape.clone(), weight.clone()]),
-                (&element.node_gradients, vec![shape.clone()]),
-            ];
-            for (found, (kernel, inputs)) in found.iter_mut().zip(&cases) {
-                if functions.has(&kernel.ir().name) {
-                    let kernel = PointKernel { near: kernel, far: None };
-                    check(&format!("{}, {}", law.info.name, kernel.name()), &functions, kernel, inputs);
-                    *found += 1;
-                }
-            }
+    for declaration in declarations().expect("the build has read them") {
+        let entry = elements().iter().find(|e| e.info.name == declaration.name).expect("an element of this build");
+        let kernels = kernels(&declaration).expect("the element is well-formed");
+        let texts = entry.functions;
+        let cases = [
+            (&kernels.gradient, texts.gradient),
+            (&kernels.contract, texts.contract),
+            (&kernels.node_gradients, texts.node_gradients),
+        ];
+        for (kernel, text) in cases {
+            let mut random = |n: u32| (0..n).map(|_| rng.uniform(-1.0, 1.0) as f32).collect::<Vec<f32>>();
+            let inputs: Vec<_> = kernel.ir().inputs.iter().map(|&(role, n)| (role, random(n))).collect();
+            let what = format!("{}, {}", declaration.name, kernel.ir().name);
+            check(&what, &Functions::parse(text), PointKernel { near: kernel, far: None }, &inputs);
         }
     }
-    assert!(found.iter().all(|n| *n > 0), "no text has one of the functions: {found:?}");
 }
 
 /// A kernel of three constants, with these values as outputs and the first of them as a margin.

@@ -73,14 +73,7 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
     // Without a handler an interruption ends the process as it always did: nothing else depends on it.
     let _ = ctrlc::set_handler(move || flag.store(true, Ordering::SeqCst));
     let mut display = Display::new(interrupted, arguments.quiet || arguments.json, arguments.quiet);
-    let outcome = match run_on(&target, &scene, Some(&out), &mut display) {
-        // Where the choice is the program's, it takes a device that computes the elements.
-        Err(RunError::Device(DeviceError::Element { .. })) if arguments.device == DeviceChoice::Auto => {
-            run_on(&Target::Cpu, &scene, Some(&out), &mut display)
-        }
-        outcome => outcome,
-    };
-    let outcome = outcome.map_err(|e| match e {
+    let outcome = run_on(&target, &scene, Some(&out), &mut display).map_err(|e| match e {
         RunError::Build(e) => Failure::bad_input(e.to_string()),
         RunError::Output(e) => Failure::bad_input(e.to_string()),
         RunError::Threads { .. } => Failure::bad_input(e.to_string()),

@@ -72,6 +72,33 @@ fn a_wrong_declaration_is_refused() {
     check(hexahedron, "degree = 5", "degree = 6", "its quadrature is not exact for polynomials of degree 6");
 }
 
+/// Reduced integration leaves hourglass modes, as many as the literature counts: 12 of the trilinear hexahedron with one
+/// point, 6 of the serendipity hexahedron with eight; in the plane 2 and 1.
+#[test]
+fn reduced_integration_is_refused() {
+    let rule = |name: &str| {
+        let text = text(name);
+        let start = text.find("[quadrature]").expect("a rule");
+        let end = start + text[start..].find("[vtk]").expect("what follows it");
+        text[start..end].to_string()
+    };
+    let one =
+        |x: &str, weight: u32| format!("[quadrature]\ndegree = 1\npoints = [\"{x}\"]\nweights = [\"{weight}\"]\n\n");
+    let cases = [
+        ("hexahedron_q1", one("0, 0, 0", 8), 12, 1),
+        ("hexahedron_s2", rule("hexahedron_q1"), 6, 8),
+        ("quadrangle_q1", one("0, 0", 4), 2, 1),
+        ("quadrangle_s2", rule("quadrangle_q1"), 1, 4),
+    ];
+    for (name, reduced, modes, points) in cases {
+        let refused = format!(
+            "{modes} motions that are not rigid have no strain at its {points} quadrature points (hourglass modes): \
+             declare a rule of more points"
+        );
+        check(name, &rule(name), &reduced, &refused);
+    }
+}
+
 /// The Kronecker property is one of its own: eight functions have more freedom than the six polynomials of second order.
 /// Multiples c_j of one function with sum_j c_j p(x_j) = 0 for all of these change nothing that is reproduced.
 #[test]

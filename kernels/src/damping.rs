@@ -8,7 +8,7 @@ use crate::generated::tetrahedron_p1::{NODES, node_gradients};
 use crate::law::Law;
 use crate::point::DampingPointKernels;
 use crate::real::Real;
-use crate::shader::DampingShaders;
+use crate::shader::DampingFunctions;
 
 /// A constitutive law with damping: point kernels generated from its dissipation density D.
 ///
@@ -80,16 +80,16 @@ pub struct DampingEntry {
     pub point_f32: fn() -> DampingPointKernels<f32>,
     /// Kernels at quadrature points in double precision.
     pub point_f64: fn() -> DampingPointKernels<f64>,
-    /// The element passes as WGSL, in single precision.
-    pub shaders: &'static DampingShaders,
+    /// Point kernels as WGSL, in single precision.
+    pub functions: &'static DampingFunctions,
 }
 
 impl DampingEntry {
     /// The damping of a law.
-    pub const fn new<L: Dissipative>(linear: bool, shaders: &'static DampingShaders) -> Self {
+    pub const fn new<L: Dissipative>(linear: bool, functions: &'static DampingFunctions) -> Self {
         let (f32, f64) = (DampingKernels::<f32>::of::<L>, DampingKernels::<f64>::of::<L>);
         let (point_f32, point_f64) = (DampingPointKernels::<f32>::of::<L>, DampingPointKernels::<f64>::of::<L>);
-        Self { linear, f32, f64, point_f32, point_f64, shaders }
+        Self { linear, f32, f64, point_f32, point_f64, functions }
     }
 }
 

@@ -5,6 +5,7 @@
 //! of the point.
 
 use crate::real::Real;
+use crate::shader::ElementFunctions;
 
 /// An element, as its file declares it.
 #[derive(Debug, Clone, PartialEq)]
@@ -174,12 +175,14 @@ pub struct ElementEntry {
     pub f32: fn() -> ElementKernels<f32>,
     /// Its kernels in double precision.
     pub f64: fn() -> ElementKernels<f64>,
+    /// Its kernels as WGSL, in single precision.
+    pub functions: &'static ElementFunctions,
 }
 
 impl ElementEntry {
     /// The entry of an element.
-    pub const fn new<E: Element>(info: &'static ElementInfo) -> Self {
-        Self { info, f32: ElementKernels::<f32>::of::<E>, f64: ElementKernels::<f64>::of::<E> }
+    pub const fn new<E: Element>(info: &'static ElementInfo, functions: &'static ElementFunctions) -> Self {
+        Self { info, f32: ElementKernels::<f32>::of::<E>, f64: ElementKernels::<f64>::of::<E>, functions }
     }
 }
 

@@ -4,7 +4,7 @@ use crate::batch;
 use crate::damping::{DampingEntry, Dissipative};
 use crate::point::PointKernels;
 use crate::real::Real;
-use crate::shader::{DampingShaders, LawShaders};
+use crate::shader::{DampingFunctions, LawFunctions};
 
 /// A constitutive law: point kernels generated from its strain energy density W.
 ///
@@ -193,23 +193,27 @@ pub struct LawEntry {
     pub point_f32: fn() -> PointKernels<f32>,
     /// Kernels at quadrature points in double precision.
     pub point_f64: fn() -> PointKernels<f64>,
-    /// The element passes as WGSL, in single precision.
-    pub shaders: &'static LawShaders,
+    /// Point kernels as WGSL, in single precision.
+    pub functions: &'static LawFunctions,
     /// Its damping, if it has a dissipation.
     pub damping: Option<DampingEntry>,
 }
 
 impl LawEntry {
     /// The entry of a law.
-    pub const fn new<L: Law>(info: &'static LawInfo, source: &'static LawSource, shaders: &'static LawShaders) -> Self {
+    pub const fn new<L: Law>(
+        info: &'static LawInfo,
+        source: &'static LawSource,
+        functions: &'static LawFunctions,
+    ) -> Self {
         let (f32, f64) = (BatchKernels::<f32>::of::<L>, BatchKernels::<f64>::of::<L>);
         let (point_f32, point_f64) = (PointKernels::<f32>::of::<L>, PointKernels::<f64>::of::<L>);
-        Self { info, source, material: L::material, f32, f64, point_f32, point_f64, shaders, damping: None }
+        Self { info, source, material: L::material, f32, f64, point_f32, point_f64, functions, damping: None }
     }
 
     /// The entry with the law's damping; `linear` says whether its differential does not depend on the rate.
-    pub const fn with_damping<L: Dissipative>(mut self, linear: bool, shaders: &'static DampingShaders) -> Self {
-        self.damping = Some(DampingEntry::new::<L>(linear, shaders));
+    pub const fn with_damping<L: Dissipative>(mut self, linear: bool, functions: &'static DampingFunctions) -> Self {
+        self.damping = Some(DampingEntry::new::<L>(linear, functions));
         self
     }
 

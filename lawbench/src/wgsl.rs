@@ -94,10 +94,10 @@ impl Device {
 mod gpu {
     use std::sync::Arc;
 
-    use tensormass_codegen::element::{kernels, tetrahedron_p1};
+    use tensormass_codegen::ir::Input;
     use tensormass_codegen::print::wgsl;
     use tensormass_kernels::RestPoint;
-    use tensormass_kernels::shader::{Binding, LawShaders, Shader};
+    use tensormass_kernels::shader::{Argument, LawFunctions, PointFunction};
     use tensormass_kernels::{LawEntry, law, laws};
     use tensormass_runtime::backend::{Backend, ForceField};
     use tensormass_runtime::body::{Body, LawBatch};
@@ -189,51 +189,41 @@ mod gpu {
         if let (Origin::Build, Some(entry)) = (&subject.origin, law(subject.name())) {
             return entry;
         }
-        let element = kernels(&tetrahedron_p1()).expect("the linear tetrahedron is an element");
-        let [energy, force, dforce, diagonal, cauchy] =
-            wgsl::law_shaders(&subject.law, &subject.derivation, &element).map(shader);
-        let shaders = LawShaders { energy, force, dforce, diagonal, cauchy };
+        let printed = wgsl::LawFunctions::new(&subject.law, &subject.derivation);
+        let [energy, force, dforce, diagonal, cauchy] = printed.elastic.each_ref().map(function);
+        let functions = LawFunctions { banner: leaked(&printed.banner), energy, force, dforce, diagonal, cauchy };
         // Element passes need no more of an entry than these; the CPU's kernels are another law's, and never called.
         let like = laws()[0];
         let mut info = like.info.clone();
         info.name = leaked(subject.name());
         info.domain = subject.law.domain.as_ref().map(|d| leaked(&d.text));
         info.constants = Box::leak(vec![""; subject.derivation.constants.len()].into_boxed_slice());
-        let (info, shaders) = (Box::leak(Box::new(info)), Box::leak(Box::new(shaders)));
-        Box::leak(Box::new(LawEntry { info, shaders, damping: None, ..like }))
+        let (info, functions) = (Box::leak(Box::new(info)), Box::leak(Box::new(functions)));
+        Box::leak(Box::new(LawEntry { info, functions, damping: None, ..like }))
     }
 
     fn leaked(text: &str) -> &'static str {
         Box::leak(text.to_string().into_boxed_str())
     }
 
-    fn shader(printed: wgsl::Shader) -> Shader {
-        let bindings: Vec<Binding> = printed.bindings.into_iter().map(binding).collect();
-        Shader { text: leaked(&printed.text), bindings: Box::leak(bindings.into_boxed_slice()) }
+    fn function(printed: &wgsl::PointFunction) -> PointFunction {
+        let arguments: Vec<Argument> = printed.arguments.iter().map(argument).collect();
+        PointFunction {
+            name: leaked(&printed.name),
+            text: leaked(&printed.text),
+            arguments: Box::leak(arguments.into_boxed_slice()),
+            field: printed.field,
+        }
     }
 
-    fn binding(printed: wgsl::Binding) -> Binding {
-        use wgsl::Binding as B;
-        match printed {
-            B::ElementPass => Binding::ElementPass,
-            B::NodePass => Binding::NodePass,
-            B::Nodes => Binding::Nodes,
-            B::Rest => Binding::Rest,
-            B::Constants => Binding::Constants,
-            B::Displacement => Binding::Displacement,
-            B::Velocity => Binding::Velocity,
-            B::Increment => Binding::Increment,
-            B::Slots => Binding::Slots,
-            B::SlotIndex => Binding::SlotIndex,
-            B::Offsets => Binding::Offsets,
-            B::Margins => Binding::Margins,
-            B::Energies => Binding::Energies,
-            B::Stresses => Binding::Stresses,
-            B::Gate => Binding::Gate,
-            B::Sum => Binding::Sum,
-            B::Masses => Binding::Masses,
-            B::Product => Binding::Product,
-            B::Partials => Binding::Partials,
+    fn argument(role: &Input) -> Argument {
+        match role {
+            Input::Constants => Argument::Constants,
+            Input::DisplacementGradient => Argument::DisplacementGradient,
+            Input::GradientRate => Argument::GradientRate,
+            Input::GradientIncrement => Argument::GradientIncrement,
+            Input::NodeGradient => Argument::NodeGradient,
+            other => unreachable!("no kernel of a law reads {other:?} at a point"),
         }
     }
 }

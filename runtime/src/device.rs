@@ -81,14 +81,6 @@ pub enum DeviceError {
     /// A GPU was asked for, and double precision.
     #[error("a GPU computes in f32, and f64 is asked for\n  = help: choose --precision f32, or --device cpu")]
     Precision,
-    /// The mesh has elements that GPUs do not compute yet.
-    #[error(
-        "a GPU computes linear tetrahedra only, and the mesh has elements `{element}`\n  = help: choose --device cpu"
-    )]
-    Element {
-        /// The element's name.
-        element: &'static str,
-    },
     /// One buffer is larger than the device can bind.
     #[error(
         "{what} would take {bytes} bytes in one buffer, and this GPU binds at most {limit}\n  = help: use a coarser \

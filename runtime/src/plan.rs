@@ -93,6 +93,10 @@ impl Plan {
             .collect();
         let (nodes, elements) = (model.body.masses.len(), model.body.elements.len());
         let (slots, points) = (model.body.elements.values().len(), model.body.rest.values().len());
+        // A GPU has nodes four by four, and slopes of reference elements with each law and kind.
+        let fours: usize = model.body.batches.iter().map(|b| b.elements.len() * b.element.info.nodes.div_ceil(4)).sum();
+        let mapped = model.body.batches.iter().map(|b| b.element.info).filter(|info| !info.is_linear_simplex);
+        let slopes: usize = mapped.map(|info| info.points.len() * (info.nodes - 1)).sum();
         let vectors = if implicit { 20 + 2 * usize::from(viscous || proportional) } else { 6 };
         let constants: usize = model.body.batches.iter().map(|b| b.constants.len()).sum();
         let with_domain = model.body.batches.iter().filter(|b| b.law.info.domain.is_some());
@@ -113,11 +117,11 @@ impl Plan {
                 ]
             }
             Layout::Gpu => vec![
-                ("element nodes", 16 * elements),
-                ("rest data", 48 * elements),
+                ("element nodes", 16 * fours),
+                ("rest data", 48 * points + 16 * slopes),
                 ("material constants", 4 * constants),
-                ("partial forces", 64 * elements),
-                ("slots of elements and nodes", 16 * elements + 4 * (nodes + 1)),
+                ("partial forces", 16 * slots),
+                ("slots of elements and nodes", 16 * fours + 4 * (nodes + 1)),
                 ("margins of domains", 4 * margins),
                 ("state and work vectors", (vectors + 1) * 16 * nodes),
             ],

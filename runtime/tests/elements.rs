@@ -4,7 +4,7 @@
 mod meshes;
 mod support;
 
-use meshes::{distorted, of_dimension, unit};
+use meshes::{boxes_beside_wedges, distorted, of_dimension, unit};
 use nalgebra::DMatrix;
 use support::{CANTILEVER, Random, body, case, done, number, parameters, probe, relative, scene, system};
 use tensormass_kernels::{ElementEntry, elements, laws};
@@ -13,7 +13,7 @@ use tensormass_runtime::backend::{Backend, ForceField};
 use tensormass_runtime::cg::CgLimits;
 use tensormass_runtime::cpu::{Kernels, Part};
 use tensormass_runtime::integrate::{NewtonLimits, SolverSettings, Statics};
-use tensormass_runtime::mesh::{Block, Groups, Mesh, integrals};
+use tensormass_runtime::mesh::{Mesh, integrals};
 use tensormass_runtime::scene::Preconditioner;
 use tensormass_runtime::system::Integrator;
 
@@ -267,23 +267,12 @@ fn patch_tests() {
     }
 }
 
-/// Boxes and wedges that share faces: both are made on one lattice, so that their nodes have the same numbers.
+/// Boxes and wedges that share faces.
 #[test]
 fn patch_tests_of_mixed_meshes() {
-    let [boxes, wedges] = ["hexahedron_q1", "prism_p1"].map(|name| tensormass_kernels::element(name).expect("shipped"));
-    let cells = 3;
-    let [of_boxes, of_wedges] = [boxes, wedges].map(|element| unit(element, cells));
-    assert_eq!(of_boxes.nodes(), of_wedges.nodes());
-    let part = |mesh: &Mesh, each: usize, left: bool| {
-        let block = &mesh.blocks()[0];
-        // Cells follow each other along z, then y, then x.
-        let is_left = |e: usize| e / each / (cells * cells) < 2;
-        let nodes = block.elements().enumerate().filter(|(e, _)| is_left(*e) == left).flat_map(|(_, n)| n);
-        Block { element: block.element, nodes: nodes.copied().collect() }
-    };
-    let blocks = vec![part(&of_boxes, 1, true), part(&of_wedges, 2, false)];
-    let mesh = Mesh::new(of_boxes.nodes().to_vec(), blocks, Groups::default()).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!(mesh.surface_nodes(), of_boxes.surface_nodes(), "faces between boxes and wedges are inside");
+    let mesh = boxes_beside_wedges(3);
+    let boxes = unit(tensormass_kernels::element("hexahedron_q1").expect("shipped"), 3);
+    assert_eq!(mesh.surface_nodes(), boxes.surface_nodes(), "faces between boxes and wedges are inside");
     for law in laws() {
         patch(&distorted(&mesh, 0.3, 17), law);
     }

@@ -3,6 +3,8 @@
 //! No tolerance is chosen: see `states`. `--nocapture` prints the worst difference as a part of its bound.
 #![cfg(feature = "gpu")]
 
+#[path = "support/elements.rs"]
+mod meshes;
 mod support;
 
 #[path = "gpu_kernels/domain.rs"]

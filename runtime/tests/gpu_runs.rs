@@ -1,12 +1,16 @@
 //! Whole runs on a GPU: against the CPU in the same precision, what they ask of the device, and a device that fails.
 #![cfg(feature = "gpu")]
 
+#[path = "support/elements.rs"]
+mod meshes;
 mod support;
 
 use std::sync::Arc;
 
+use meshes::boxes_beside_wedges;
 use support::gpu::test_device;
 use support::{body, done, outcome, parameters, repository, scene, table, viscous};
+use tensormass_kernels::elements;
 use tensormass_runtime::backend::{Backend, Counts, ForceField, Operator};
 use tensormass_runtime::cg::{CgLimits, CgOutcome, ConjugateGradient};
 use tensormass_runtime::device::DeviceError;
@@ -99,6 +103,50 @@ fn every_law_with_every_integrator() {
             check(&gpu, &name, &scene::<&str>(&bent(law, solver), &[]), 1e-4, &[("sag", 0.4)]);
         }
     }
+}
+
+/// Every element with every kind of integrator, as [`every_law_with_every_integrator`].
+#[test]
+fn every_element_with_every_kind_of_integrator() {
+    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let implicit = "step = 0.01\nduration = 0.04\ncg = { tolerance = 1e-6, max_iterations = 2000 }";
+    let newton = "newton = { tolerance = 1e-5, max_iterations = 20 }";
+    let solvers = [
+        "integrator = \"semi-implicit-euler\"\nstep = 1e-4\nduration = 0.01\nstiffness_damping = 1e-4".to_string(),
+        format!("integrator = \"implicit-euler\"\nstiffness_damping = 0.01\n{implicit}\n{newton}"),
+        format!("integrator = \"static\"\n{implicit}\n{newton}"),
+    ];
+    let law = laws().iter().find(|law| law.damping.is_some() || law.info.domain.is_some()).expect("such a law");
+    for element in elements().iter().filter(|e| e.info.dimension > 1) {
+        let cells = if element.info.dimension == 2 { "cells=[8, 2, 1]" } else { "cells=[6, 1, 1]" };
+        let set = [format!("mesh.beam.{cells}"), format!("mesh.beam.element={}", element.info.name)];
+        for solver in &solvers {
+            let name = format!("{}, {}", element.info.name, solver.lines().next().unwrap_or_default());
+            check(&gpu, &name, &scene(&bent(law, solver), &set), 1e-4, &[("sag", 0.4)]);
+        }
+    }
+}
+
+/// A device compiles the passes that a scene needs, of the laws and elements that it has: an explicit step of two kinds
+/// has two passes over elements, an implicit solve brings the differential and the diagonal of both.
+#[test]
+fn passes_are_those_that_a_scene_needs() {
+    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let mesh = boxes_beside_wedges(3);
+    let law = laws().iter().find(|law| !law.info.structure.linear && law.damping.is_none()).expect("such a law");
+    let body = body(&mesh, law, &parameters(law), &[]);
+    let backend = GpuBackend::new(Arc::clone(&gpu), &body, GpuOptions::default()).expect("it fits");
+    let mut field = GpuField::new(&backend, &body).expect("it fits");
+    let (u, mut f) = (backend.zeros(), backend.zeros());
+    assert_eq!(field.compiled_element_passes(), 0);
+    for _ in 0..2 {
+        field.add_force(&backend, &u, &mut f).expect("at rest");
+        assert_eq!(field.compiled_element_passes(), 2);
+    }
+    field.prepare(&backend, &u);
+    field.add_diagonal(&backend, 1.0, &mut f);
+    field.add_dforce(&backend, &u, 1.0, &mut f);
+    assert_eq!(field.compiled_element_passes(), 6);
 }
 
 /// The same run twice gives the same bits.

@@ -7,6 +7,7 @@ use crate::ir::{Number, Rational};
 
 use super::ElementError;
 use super::polynomial::{self, Polynomial};
+use super::rank;
 use super::shape::{SHAPES, Shape};
 
 /// An element, as data.
@@ -225,7 +226,14 @@ impl ElementDeclaration {
                 return Err(format!("its quadrature is not exact for polynomials of degree {}", self::degree(&p)));
             }
         }
-        Ok(())
+        match rank::hourglass_modes(self) {
+            0 => Ok(()),
+            free => Err(format!(
+                "{free} motions that are not rigid have no strain at its {} quadrature points (hourglass modes): declare a \
+                 rule of more points",
+                points.len()
+            )),
+        }
     }
 
     /// The faces against the elements that they are: each function restricted to a face is the face's function of that node,

@@ -13,6 +13,7 @@
 mod declaration;
 mod mapped;
 mod polynomial;
+mod rank;
 mod shape;
 
 use num_traits::One;

@@ -7,47 +7,17 @@
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use tensormass_kernels::LawEntry;
-use tensormass_kernels::generated::{NODE_PRODUCT, NODE_SUM};
-use tensormass_kernels::shader::{Binding, Shader};
+use tensormass_kernels::shader::{Argument, Binding, Pass, Shader, element_pass, node_product, node_sum};
+use tensormass_kernels::{ElementEntry, LawEntry};
 
 use crate::backend::{Backend, ForceField, LeftDomain, Operator};
 use crate::body::{Body, LawBatch};
 use crate::device::DeviceError;
-use crate::mesh::{Incidence, NodeId};
 
 use super::backend::{GpuBackend, GpuRegisters, GpuVector, open_gate};
+use super::page::{Page, Range, pages};
 use super::recorder::{Kernel, Memory, Recorder};
 use super::shaders::{Access, Operation};
-
-/// Bytes of slots an element: the largest of its buffers.
-const SLOT_BYTES: u64 = 64;
-
-/// Elements of one law within a page.
-struct Range {
-    law: &'static LawEntry,
-    /// The mesh's number of each element.
-    elements: Vec<u32>,
-    /// Constants between one element's set and the next.
-    stride: u32,
-    nodes: Memory,
-    rest: Memory,
-    constants: Memory,
-    slot_index: Memory,
-    /// Only where the law has a domain.
-    margins: Option<Memory>,
-    /// For what an output pass writes, made when one is asked for.
-    output: Option<Memory>,
-}
-
-/// Elements whose slots fit into one binding, and where each node's slots begin.
-struct Page {
-    ranges: Vec<Range>,
-    offsets: Memory,
-}
-
-/// A pass of a law; none of damping where the law has no dissipation.
-type Pass = fn(&LawEntry) -> Option<&'static Shader>;
 
 /// Which elements a pass runs over.
 #[derive(Debug, Clone, Copy)]
@@ -55,6 +25,12 @@ enum Of {
     All,
     /// Those of laws with a dissipation.
     Damped,
+}
+
+/// A pass that the device has compiled.
+struct Compiled {
+    kernel: Rc<Kernel>,
+    bindings: Vec<Binding>,
 }
 
 /// All elements of a body.
@@ -68,8 +44,10 @@ pub struct GpuField {
     state: Option<GpuVector>,
     gate: Memory,
     elements: usize,
-    /// Compiled passes, by the place of their text and the stride of their constants.
-    kernels: HashMap<(*const u8, u32), Rc<Kernel>>,
+    /// Element passes by law, kind and the stride of constants, compiled when first needed: a scene has those of its pairs.
+    element_passes: HashMap<(&'static str, &'static str, u32, Pass), Rc<Compiled>>,
+    /// The node passes, by whether they make a product.
+    node_passes: HashMap<bool, Rc<Compiled>>,
     work_group_size: u32,
     elements_per_invocation: u32,
 }
@@ -87,31 +65,31 @@ impl GpuField {
     /// The elements of a body, in pages.
     ///
     /// # Errors
-    /// An element has no kernels here, a buffer is larger than the device can bind, or the device has failed.
+    /// A buffer is larger than the device can bind, or the device has failed.
     pub fn new(backend: &GpuBackend, body: &Body) -> Result<Self, DeviceError> {
-        if let Some(other) = body.batches.iter().find(|batch| !batch.element.info.is_linear_simplex) {
-            return Err(DeviceError::Element { element: other.element.info.name });
-        }
         let recorder = Rc::clone(backend.recorder());
         let options = backend.options();
         let limit = recorder.gpu().limits().storage_binding_bytes;
         let limit = options.binding_bytes.map_or(limit, |bytes| bytes.min(limit));
-        let pages = |of: &dyn Fn(&LawBatch) -> bool| -> Result<Vec<Page>, DeviceError> {
-            paged(body.batches.iter().filter(|b| of(b)), limit).iter().map(|p| Page::new(&recorder, body, p)).collect()
-        };
+        let made =
+            |of: &dyn Fn(&LawBatch) -> bool| pages(&recorder, body, body.batches.iter().filter(|b| of(b)), limit);
         let dissipative = |b: &LawBatch| b.law.damping.is_some();
         let mixed = body.is_viscous() && !body.batches.iter().all(dissipative);
-        let damped = if mixed { Some(pages(&dissipative)?) } else { None };
-        let pages = pages(&|_| true)?;
-        let largest = pages.iter().map(Page::elements).max().unwrap_or(0);
-        let depends = |shader: &Shader| shader.bindings.contains(&Binding::Displacement);
-        let state = body.batches.iter().map(|b| b.law.shaders).any(|s| depends(&s.dforce) || depends(&s.diagonal));
+        let damped = if mixed { Some(made(&dissipative)?) } else { None };
+        let pages = made(&|_| true)?;
+        // A page of damped elements alone may have more of them than any other.
+        let slot_bytes = pages.iter().chain(damped.iter().flatten()).map(Page::slot_bytes).max().unwrap_or(0);
+        let depends = |law: &LawEntry, pass: Pass| {
+            pass.function(law).is_some_and(|f| f.arguments.contains(&Argument::DisplacementGradient))
+        };
+        let state = body.batches.iter().any(|b| depends(b.law, Pass::DForce) || depends(b.law, Pass::Diagonal));
         let field = Self {
-            slots: recorder.memory("partial forces", SLOT_BYTES * largest as u64)?,
+            slots: recorder.memory("partial forces", slot_bytes)?,
             state: state.then(|| backend.zeros()),
             gate: recorder.filled("a gate", &open_gate())?,
             elements: body.elements.len(),
-            kernels: HashMap::new(),
+            element_passes: HashMap::new(),
+            node_passes: HashMap::new(),
             work_group_size: options.work_group_size,
             elements_per_invocation: options.elements_per_invocation,
             recorder,
@@ -127,25 +105,51 @@ impl GpuField {
         self.pages.len()
     }
 
-    fn kernel(&mut self, shader: &Shader, stride: u32, label: &str) -> Rc<Kernel> {
-        let Self { kernels, recorder, work_group_size, elements_per_invocation, .. } = self;
-        let made = kernels.entry((shader.text.as_ptr(), stride)).or_insert_with(|| {
-            let access = |b: &Binding| match (b.is_uniform(), b.is_written()) {
-                (true, _) => Access::Uniform,
-                (false, true) => Access::Write,
-                (false, false) => Access::Read,
-            };
-            let bindings: Vec<Access> = shader.bindings.iter().map(access).collect();
-            let mut constants = vec![("work_group_size", f64::from(*work_group_size))];
-            if shader.bindings.contains(&Binding::ElementPass) {
-                constants.push(("elements_per_invocation", f64::from(*elements_per_invocation)));
-            }
-            if shader.bindings.contains(&Binding::Constants) {
-                constants.push(("constants_stride", f64::from(stride)));
-            }
-            recorder.kernel(label, shader.text, &bindings, &constants)
-        });
-        Rc::clone(made)
+    /// The passes over elements that the device has compiled so far: those of the laws and kinds that were computed.
+    pub fn compiled_element_passes(&self) -> usize {
+        self.element_passes.len()
+    }
+
+    /// The pass of a law on a kind of element, compiled.
+    fn element_pass(&mut self, law: &LawEntry, element: &ElementEntry, stride: u32, pass: Pass) -> Rc<Compiled> {
+        let key = (law.info.name, element.info.name, stride, pass);
+        if let Some(made) = self.element_passes.get(&key) {
+            return Rc::clone(made);
+        }
+        let shader = element_pass(law, element, pass).expect("damping runs over laws with a dissipation");
+        let label = format!("{pass:?}: {}, {}", law.info.name, element.info.name);
+        let made = Rc::new(self.compiled(shader, stride, &label));
+        self.element_passes.insert(key, Rc::clone(&made));
+        made
+    }
+
+    /// The pass over nodes that makes a product, or that which adds sums, compiled.
+    fn node_pass_of(&mut self, product: bool) -> Rc<Compiled> {
+        if let Some(made) = self.node_passes.get(&product) {
+            return Rc::clone(made);
+        }
+        let (shader, label) = if product { (node_product(), "product at nodes") } else { (node_sum(), "sum of slots") };
+        let made = Rc::new(self.compiled(shader, 0, label));
+        self.node_passes.insert(product, Rc::clone(&made));
+        made
+    }
+
+    fn compiled(&self, shader: Shader, stride: u32, label: &str) -> Compiled {
+        let access = |b: &Binding| match (b.is_uniform(), b.is_written()) {
+            (true, _) => Access::Uniform,
+            (false, true) => Access::Write,
+            (false, false) => Access::Read,
+        };
+        let accesses: Vec<Access> = shader.bindings.iter().map(access).collect();
+        let mut constants = vec![("work_group_size", f64::from(self.work_group_size))];
+        if shader.bindings.contains(&Binding::ElementPass) {
+            constants.push(("elements_per_invocation", f64::from(self.elements_per_invocation)));
+        }
+        if shader.bindings.contains(&Binding::Constants) {
+            constants.push(("constants_stride", f64::from(stride)));
+        }
+        let kernel = self.recorder.kernel(label, &shader.text, &accesses, &constants);
+        Compiled { kernel, bindings: shader.bindings }
     }
 
     /// The pages of some elements: where every law has a dissipation, those of all.
@@ -156,18 +160,17 @@ impl GpuField {
         }
     }
 
-    /// Pass 1 of one page: a pass of each law.
+    /// Pass 1 of one page: a pass of each law and kind.
     fn element_passes(&mut self, of: Of, page: usize, pass: Pass, bound: &Bound) {
         for range in 0..self.pages_of(of)[page].ranges.len() {
-            let Range { stride, law, .. } = self.pages_of(of)[page].ranges[range];
-            let shader = pass(law).expect("damping runs over laws with a dissipation");
-            let kernel = self.kernel(shader, stride, law.info.name);
+            let Range { stride, law, element, .. } = self.pages_of(of)[page].ranges[range];
+            let compiled = self.element_pass(law, element, stride, pass);
             let range = &self.pages_of(of)[page].ranges[range];
-            let storage: Vec<&Memory> = shader.bindings[1..].iter().map(|&b| self.buffer(b, range, bound)).collect();
+            let storage: Vec<&Memory> = compiled.bindings[1..].iter().map(|&b| self.buffer(b, range, bound)).collect();
             let count = range.elements.len();
             let invocations = count.div_ceil(self.elements_per_invocation as usize);
             let groups = self.recorder.groups(invocations, self.work_group_size);
-            self.recorder.dispatch(&kernel, [count as u32, 0, 0, 0], &storage, groups);
+            self.recorder.dispatch(&compiled.kernel, [count as u32, 0, 0, 0], &storage, groups);
         }
     }
 
@@ -198,11 +201,11 @@ impl GpuField {
 
     /// Pass 2 of one page: y += factor times the sum of each node's slots.
     fn node_pass(&mut self, of: Of, page: usize, nodes: usize, factor: f64, y: &GpuVector) {
-        let kernel = self.kernel(&NODE_SUM, 0, "sum of slots");
+        let compiled = self.node_pass_of(false);
         let numbers = [nodes as u32, 0, (factor as f32).to_bits(), 0];
         let storage = [&self.slots, &self.pages_of(of)[page].offsets, y.memory()];
         let groups = self.recorder.groups(nodes, self.work_group_size);
-        self.recorder.dispatch(&kernel, numbers, &storage, groups);
+        self.recorder.dispatch(&compiled.kernel, numbers, &storage, groups);
     }
 
     /// Both passes of every page: y += factor times the sums.
@@ -228,7 +231,7 @@ impl GpuField {
         let groups = self.recorder.groups(nodes, self.work_group_size);
         for page in 0..self.pages_of(of).len() {
             self.element_passes(of, page, pass, bound);
-            let kernel = self.kernel(&NODE_PRODUCT, 0, "product at nodes");
+            let compiled = self.node_pass_of(true);
             let mass = first.filter(|_| page == 0);
             // The slots hold -K x or -C x.
             let factors = [-factor, mass.or(first).unwrap_or(0.0)].map(|f| (f as f32).to_bits());
@@ -242,7 +245,7 @@ impl GpuField {
                 backend.partials(),
                 bound.gate.unwrap_or(&self.gate),
             ];
-            self.recorder.dispatch(&kernel, numbers, &storage, groups);
+            self.recorder.dispatch(&compiled.kernel, numbers, &storage, groups);
         }
     }
 
@@ -306,120 +309,6 @@ impl GpuField {
     }
 }
 
-/// A part of one law's elements: the batch, and which of its elements.
-type Part<'a> = (&'a LawBatch, std::ops::Range<usize>);
-
-/// Elements in pages whose buffers have at most `limit` bytes.
-fn paged<'a>(batches: impl Iterator<Item = &'a LawBatch>, limit: u64) -> Vec<Vec<Part<'a>>> {
-    let mut pages = vec![];
-    let (mut page, mut room) = (vec![], limit);
-    for batch in batches {
-        let count = batch.law.info.constants.len() as u64;
-        let widest = if batch.per_element { SLOT_BYTES.max(4 * count) } else { SLOT_BYTES };
-        let mut start = 0;
-        while start < batch.elements.len() {
-            let fits = (room / widest) as usize;
-            if fits == 0 && !page.is_empty() {
-                pages.push(std::mem::take(&mut page));
-                room = limit;
-                continue;
-            }
-            // A device that cannot bind one element cannot be used; the buffer's own error says so.
-            let end = (start + fits.max(1)).min(batch.elements.len());
-            page.push((batch, start..end));
-            room = room.saturating_sub(widest * (end - start) as u64);
-            start = end;
-        }
-    }
-    if !page.is_empty() {
-        pages.push(page);
-    }
-    pages
-}
-
-/// The nodes of a linear tetrahedron.
-fn four(nodes: &[u32]) -> [u32; 4] {
-    std::array::from_fn(|a| nodes[a])
-}
-
-impl Page {
-    fn new(recorder: &Recorder, body: &Body, parts: &[Part]) -> Result<Self, DeviceError> {
-        let numbers = |(batch, part): &Part| batch.elements[part.clone()].to_vec();
-        let all = parts.iter().flat_map(numbers).map(|e| four(&body.elements[e as usize]).map(|n| n as usize));
-        let all = all.collect::<Vec<_>>().into_flattened();
-        let incidence = Incidence::of_slots(body.masses.len(), all.iter().copied());
-        let mut offsets = vec![0_u32];
-        let mut slot_index: Vec<[u32; 4]> = vec![[0; 4]; incidence.slots().len() / 4];
-        for node in 0..body.masses.len() {
-            let slots = incidence.of(NodeId(node as u32));
-            let first = offsets[node];
-            for (k, &slot) in slots.iter().enumerate() {
-                slot_index[slot as usize / 4][slot as usize % 4] = first + k as u32;
-            }
-            offsets.push(first + slots.len() as u32);
-        }
-        let mut rest = slot_index.as_slice();
-        let mut ranges = vec![];
-        for (batch, part) in parts {
-            let (own, others) = rest.split_at(part.len());
-            rest = others;
-            ranges.push(Range::new(recorder, body, batch, part.clone(), own)?);
-        }
-        Ok(Self { ranges, offsets: recorder.filled("slots of nodes", &offsets)? })
-    }
-
-    fn elements(&self) -> usize {
-        self.ranges.iter().map(|r| r.elements.len()).sum()
-    }
-}
-
-impl Range {
-    fn new(
-        recorder: &Recorder,
-        body: &Body,
-        batch: &LawBatch,
-        part: std::ops::Range<usize>,
-        slot_index: &[[u32; 4]],
-    ) -> Result<Self, DeviceError> {
-        let count = batch.law.info.constants.len();
-        let constants = if batch.per_element {
-            &batch.constants[part.start * count..part.end * count]
-        } else {
-            batch.constants.as_slice()
-        };
-        let elements = batch.elements[part].to_vec();
-        let nodes: Vec<[u32; 4]> = elements.iter().map(|&e| four(&body.elements[e as usize])).collect();
-        let row = |k: usize| {
-            elements.iter().map(move |&e| {
-                let r = &body.rest[e as usize][0];
-                let g = &r.inverse_jacobian[3 * k..3 * k + 3];
-                [g[0] as f32, g[1] as f32, g[2] as f32, if k == 0 { r.weight as f32 } else { 0.0 }]
-            })
-        };
-        let rest: Vec<[f32; 4]> = (0..3).flat_map(row).collect();
-        let constants: Vec<f32> = constants.iter().map(|&c| c as f32).collect();
-        let margins = match batch.law.shaders.force.bindings.contains(&Binding::Margins) {
-            true => Some(recorder.memory("margins of elements", 4 * elements.len() as u64)?),
-            false => None,
-        };
-        Ok(Self {
-            law: batch.law,
-            stride: if batch.per_element { count as u32 } else { 0 },
-            nodes: recorder.filled("nodes of elements", &nodes)?,
-            rest: recorder.filled("rest data of elements", &rest)?,
-            constants: recorder.filled("constants of materials", &constants)?,
-            slot_index: recorder.filled("slots of elements", slot_index)?,
-            margins,
-            output: None,
-            elements,
-        })
-    }
-}
-
-const DFORCE: Pass = |law| Some(&law.shaders.dforce);
-const DIAGONAL: Pass = |law| Some(&law.shaders.diagonal);
-const DDAMPING: Pass = |law| law.damping.map(|damping| &damping.shaders.ddamping);
-
 /// What damping binds of a displacement and a velocity.
 fn rate_at<'a>([u, v]: [&'a GpuVector; 2]) -> Bound<'a> {
     Bound { displacement: Some(u.memory()), velocity: Some(v.memory()), ..Bound::default() }
@@ -427,19 +316,19 @@ fn rate_at<'a>([u, v]: [&'a GpuVector; 2]) -> Bound<'a> {
 
 impl ForceField<GpuBackend> for GpuField {
     fn element_energies(&mut self, backend: &GpuBackend, u: &GpuVector) -> Result<Vec<f64>, LeftDomain> {
-        let energies = self.output(u, |law| Some(&law.shaders.energy), 1);
+        let energies = self.output(u, Pass::Energy, 1);
         self.inside(backend)?;
         Ok(energies)
     }
 
     fn cauchy(&mut self, _: &GpuBackend, u: &GpuVector) -> Vec<[f64; 9]> {
-        let values = self.output(u, |law| Some(&law.shaders.cauchy), 9);
+        let values = self.output(u, Pass::Cauchy, 9);
         values.chunks_exact(9).map(|s| std::array::from_fn(|k| s[k])).collect()
     }
 
     fn add_force(&mut self, backend: &GpuBackend, u: &GpuVector, f: &mut GpuVector) -> Result<(), LeftDomain> {
         let bound = Bound { displacement: Some(u.memory()), ..Bound::default() };
-        self.passes(backend, (Of::All, |law| Some(&law.shaders.force)), &bound, 1.0, f);
+        self.passes(backend, (Of::All, Pass::Force), &bound, 1.0, f);
         self.inside(backend)
     }
 
@@ -451,25 +340,25 @@ impl ForceField<GpuBackend> for GpuField {
 
     fn add_dforce(&mut self, backend: &GpuBackend, du: &GpuVector, factor: f64, df: &mut GpuVector) {
         let bound = Bound { increment: Some(du.memory()), ..Bound::default() };
-        self.passes(backend, (Of::All, DFORCE), &bound, factor, df);
+        self.passes(backend, (Of::All, Pass::DForce), &bound, factor, df);
     }
 
     fn add_diagonal(&mut self, backend: &GpuBackend, factor: f64, d: &mut GpuVector) {
-        self.passes(backend, (Of::All, DIAGONAL), &Bound::default(), factor, d);
+        self.passes(backend, (Of::All, Pass::Diagonal), &Bound::default(), factor, d);
     }
 
     fn add_dforce_at(&mut self, backend: &GpuBackend, u: &GpuVector, du: &GpuVector, factor: f64, df: &mut GpuVector) {
         let bound = Bound { displacement: Some(u.memory()), increment: Some(du.memory()), ..Bound::default() };
-        self.passes(backend, (Of::All, DFORCE), &bound, factor, df);
+        self.passes(backend, (Of::All, Pass::DForce), &bound, factor, df);
     }
 
     fn add_diagonal_at(&mut self, backend: &GpuBackend, u: &GpuVector, factor: f64, d: &mut GpuVector) {
         let bound = Bound { displacement: Some(u.memory()), ..Bound::default() };
-        self.passes(backend, (Of::All, DIAGONAL), &bound, factor, d);
+        self.passes(backend, (Of::All, Pass::Diagonal), &bound, factor, d);
     }
 
     fn add_damping(&mut self, backend: &GpuBackend, at: [&GpuVector; 2], factor: f64, f: &mut GpuVector) {
-        self.passes(backend, (Of::Damped, |law| law.damping.map(|d| &d.shaders.damping)), &rate_at(at), factor, f);
+        self.passes(backend, (Of::Damped, Pass::Damping), &rate_at(at), factor, f);
     }
 
     fn add_ddamping(
@@ -481,11 +370,11 @@ impl ForceField<GpuBackend> for GpuField {
         df: &mut GpuVector,
     ) {
         let bound = Bound { increment: Some(dv.memory()), ..rate_at(at) };
-        self.passes(backend, (Of::Damped, DDAMPING), &bound, factor, df);
+        self.passes(backend, (Of::Damped, Pass::DDamping), &bound, factor, df);
     }
 
     fn add_damping_diagonal(&mut self, backend: &GpuBackend, at: [&GpuVector; 2], factor: f64, d: &mut GpuVector) {
-        self.passes(backend, (Of::Damped, |law| law.damping.map(|d| &d.shaders.diagonal)), &rate_at(at), factor, d);
+        self.passes(backend, (Of::Damped, Pass::DampingDiagonal), &rate_at(at), factor, d);
     }
 
     fn product(
@@ -499,11 +388,12 @@ impl ForceField<GpuBackend> for GpuField {
         let bound = Bound { increment: Some(x.memory()), gate: Some(registers.memory()), ..Bound::default() };
         let (masses, vectors) = (operator.masses, [x, &*y]);
         let first = (operator.stiffness, Some(operator.mass));
-        self.part_of_product(backend, (Of::All, DFORCE), &bound, first, masses, vectors);
+        self.part_of_product(backend, (Of::All, Pass::DForce), &bound, first, masses, vectors);
         if let Some(damping) = &operator.damping {
             let [u, v] = [damping.u, damping.v].map(|vector| Some(vector.memory()));
             let bound = Bound { displacement: u, velocity: v, ..bound };
-            for (factor, pass) in [(damping.viscosity, (Of::Damped, DDAMPING)), (damping.stiffness, (Of::All, DFORCE))]
+            for (factor, pass) in
+                [(damping.viscosity, (Of::Damped, Pass::DDamping)), (damping.stiffness, (Of::All, Pass::DForce))]
             {
                 if factor != 0.0 {
                     self.part_of_product(backend, pass, &bound, (factor, None), masses, vectors);

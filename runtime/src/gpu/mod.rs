@@ -1,11 +1,12 @@
 //! Computing on a GPU through wgpu: Vulkan, Metal or Direct3D 12, within the limits that WebGPU guarantees.
 //!
-//! Element and node passes are generated WGSL; the arithmetic of vectors is in `shaders`, the recurrences of solvers
+//! Element passes are generated WGSL, put together for the laws and elements that a body has; the arithmetic of vectors is in `shaders`, the recurrences of solvers
 //! are traced. Vectors, solver scalars and forces stay on the device; the host waits for results where it reads one.
 
 mod backend;
 mod device;
 mod field;
+mod page;
 mod recorder;
 mod shaders;
 mod trace;

@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
+use tensormass_kernels::linear_tetrahedron;
 use tensormass_runtime::backend::{Backend, ForceField, LeftDomain};
 use tensormass_runtime::body::LawBatch;
 use tensormass_runtime::gpu::GpuOptions;
 use tensormass_runtime::{LawEntry, laws};
 use tensormass_testing::random::Rng;
 
-use crate::states::{Analysis, Disjoint, Vector};
+use crate::states::{Analysis, Disjoint, STRAIN, Vector, other_elements};
 use crate::support::gpu::test_device;
 use crate::{On, on_cpu, on_gpu};
 
@@ -19,37 +20,35 @@ fn reports<B: Backend, F: ForceField<B>>(on: &mut On<B, F>, u: &Vector) -> [Resu
     [energies, on.field.add_force(&on.backend, &u, &mut f)]
 }
 
-/// Displacements with some elements turned inside out: the edges of each are reflected.
+/// Displacements with some elements turned inside out, mirrored along x.
 fn inverted(all: &Disjoint, elements: &[u32]) -> Vector {
     let mut u = all.u.clone();
     for &e in elements {
-        let corner = 4 * e as usize;
-        for i in 0..3 {
-            // F = -I: edge k of the element becomes its negative.
-            let edge = edges(&all.body.rest[e as usize][0].inverse_jacobian);
-            for k in 0..3 {
-                u[corner + 1 + k][i] = u[corner][i] - 2.0 * edge[k][i];
-            }
+        let nodes = &all.body.elements[e as usize];
+        let first = nodes[0] as usize;
+        for n in nodes.iter().map(|n| *n as usize) {
+            u[n] = u[first];
+            u[n][0] -= 2.0 * (all.nodes[n][0] - all.nodes[first][0]);
         }
     }
     u
 }
 
-/// The edges from node 0 of an element with these gradients: columns of the inverse of their rows.
-fn edges(g: &[f64; 9]) -> [[f64; 3]; 3] {
-    let rows = [[g[0], g[1], g[2]], [g[3], g[4], g[5]], [g[6], g[7], g[8]]];
-    let cross =
-        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    let across = [cross(rows[1], rows[2]), cross(rows[2], rows[0]), cross(rows[0], rows[1])];
-    let det: f64 = (0..3).map(|i| rows[0][i] * across[0][i]).sum();
-    across.map(|c| c.map(|x| x / det))
+/// Displacements with one node of an element beyond the others: some of its points are outside, and some are not.
+fn torn(all: &Disjoint, element: u32) -> Vector {
+    let mut u = all.u.clone();
+    let nodes = &all.body.elements[element as usize];
+    let [first, last] = [nodes[0] as usize, nodes[nodes.len() - 1] as usize];
+    let at = |n: usize, i: usize| all.nodes[n][i] + all.u[n][i];
+    (0..3).for_each(|i| u[first][i] += 6.0 * (at(last, i) - at(first, i)));
+    u
 }
 
 #[test]
 fn elements_outside_are_named_as_on_the_cpu() {
     let Some(gpu) = test_device().map(Arc::new) else { return };
     let all: Vec<&'static LawEntry> = laws().iter().collect();
-    let elements = Disjoint::new(&all, 700, &Analysis::new(), &mut Rng::new(3));
+    let elements = Disjoint::new(&all, linear_tetrahedron(), (700, STRAIN), &Analysis::new(), &mut Rng::new(3));
     let options = [GpuOptions::default(), GpuOptions { binding_bytes: Some(1 << 13), ..GpuOptions::default() }];
     let mut cpu = on_cpu(&elements.body);
     for mut gpu in options.map(|options| on_gpu(&gpu, &elements.body, options)) {
@@ -73,5 +72,21 @@ fn elements_outside_are_named_as_on_the_cpu() {
         let u = one(&with);
         assert_eq!(reports(&mut gpu, &u), reports(&mut cpu, &u));
         assert_eq!(reports(&mut gpu, &one(&without)), [Ok(()), Ok(())]);
+    }
+}
+
+/// An element is outside where one of its points is.
+#[test]
+fn one_point_outside_is_enough() {
+    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let law = laws().iter().find(|law| law.info.domain.is_some()).expect("a law with a domain");
+    for element in other_elements().filter(|e| e.info.points.len() > 1) {
+        let all = Disjoint::new(&[law], element, (9, 0.1), &Analysis::new(), &mut Rng::new(9));
+        let (mut cpu, mut gpu) = (on_cpu(&all.body), on_gpu(&gpu, &all.body, GpuOptions::default()));
+        for (what, u) in [("torn", torn(&all, 4)), ("inverted", inverted(&all, &[5]))] {
+            let wanted = reports(&mut cpu, &u);
+            assert!(wanted.iter().all(Result::is_err), "{} {what}", element.info.name);
+            assert_eq!(reports(&mut gpu, &u), wanted, "{}", element.info.name);
+        }
     }
 }

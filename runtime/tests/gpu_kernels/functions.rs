@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use tensormass_kernels::LawEntry;
 use tensormass_kernels::RestPoint;
-use tensormass_kernels::shader::{Binding, LawShaders, Shader};
+use tensormass_kernels::shader::{Argument, LawFunctions, PointFunction};
 use tensormass_runtime::body::LawBatch;
 use tensormass_runtime::gpu::{Gpu, GpuOptions};
 use tensormass_runtime::laws;
@@ -21,46 +21,23 @@ use crate::support::gpu::test_device;
 /// Arguments of each function.
 const COUNT: usize = 200_000;
 
-/// The pass that stores a function of two constants as the energy.
-const PASS: &str = "
-override work_group_size: u32 = 64u;
-override elements_per_invocation: u32 = 1u;
-override constants_stride: u32 = 0u;
-struct ElementPass { elements: u32, unused_0: u32, unused_1: u32, unused_2: u32 }
-@group(0) @binding(0) var<uniform> element_pass: ElementPass;
-@group(0) @binding(1) var<storage, read> constants: array<f32>;
-@group(0) @binding(2) var<storage, read_write> energies: array<f32>;
-
-@compute @workgroup_size(work_group_size)
-fn main(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let e = elements_per_invocation * ((group.y * groups.x + group.x) * work_group_size + local);
-    if e < element_pass.elements {
-        let a = constants[constants_stride * e];
-        let b = constants[constants_stride * e + 1u];
-        energies[e] = FUNCTION;
-    }
-}
-";
-
-/// A law that is nothing but a function of two constants.
+/// A law whose energy is nothing but a function of two constants.
 fn law(function: &str) -> &'static LawEntry {
-    let text = format!("{}{}", helper_functions(), PASS.replace("FUNCTION", function));
-    let text: &'static str = Box::leak(text.into_boxed_str());
-    let shader = Shader { text, bindings: &[Binding::ElementPass, Binding::Constants, Binding::Energies] };
-    let shaders = LawShaders { energy: shader, force: shader, dforce: shader, diagonal: shader, cauchy: shader };
+    let leaked = |text: String| -> &'static str { Box::leak(text.into_boxed_str()) };
+    let density = "fn energy(c: array<f32, 2>) -> f32 {\n    let a = c[0];\n    let b = c[1];\n    return ";
+    let text = leaked(format!("{}{density}{function};\n}}\n", helper_functions()));
+    let energy = PointFunction { name: "energy", text, arguments: &[Argument::Constants], field: None };
     let like = laws()[0];
+    let (force, dforce, diagonal, cauchy) = (energy, energy, energy, energy);
+    let functions = LawFunctions { banner: "", energy, force, dforce, diagonal, cauchy };
     let mut info = like.info.clone();
-    (info.name, info.constants, info.domain) = ("function", &["a", "b"], None);
-    Box::leak(Box::new(LawEntry { info: Box::leak(Box::new(info)), shaders: Box::leak(Box::new(shaders)), ..like }))
+    (info.name, info.constants, info.domain) = (leaked(function.to_string()), &["a", "b"], None);
+    Box::leak(Box::new(LawEntry { info: Box::leak(Box::new(info)), functions: Box::leak(Box::new(functions)), ..like }))
 }
 
 /// Evaluates a function of pairs on the device.
 fn evaluated(gpu: &Arc<Gpu>, function: &str, arguments: &[[f64; 2]]) -> Vec<f64> {
-    let rest = vec![RestPoint { inverse_jacobian: [0.0; 9], weight: 1.0 }; arguments.len()];
+    let rest = arguments.iter().map(|_| [RestPoint { inverse_jacobian: [0.0; 9], weight: 1.0 }]).collect();
     let batch = LawBatch {
         law: law(function),
         element: tensormass_kernels::linear_tetrahedron(),
@@ -68,7 +45,8 @@ fn evaluated(gpu: &Arc<Gpu>, function: &str, arguments: &[[f64; 2]]) -> Vec<f64>
         constants: arguments.as_flattened().to_vec(),
         per_element: true,
     };
-    let body = body(vec![[0, 1, 2, 3]; arguments.len()], &rest, vec![batch], &mut Rng::new(0));
+    let elements = arguments.iter().map(|_| [0, 1, 2, 3]).collect();
+    let body = body(elements, &rest, vec![batch], &mut Rng::new(0));
     let nodes = vec![[0.0; 3]; 4];
     on_gpu(gpu, &body, GpuOptions::default()).fresh(Kernel::Energy, &nodes, &nodes)
 }

@@ -3,14 +3,15 @@
 use std::sync::Arc;
 
 use tensormass_runtime::backend::{Backend, Damping, ForceField, Operator, REGISTERS, RUNNING, SUM, Scalar, Update};
-use tensormass_runtime::body::{Body, Constraint};
+use tensormass_runtime::body::{Body, Constraint, LawBatch};
 use tensormass_runtime::gpu::{Gpu, GpuOptions};
 use tensormass_runtime::history::History;
-use tensormass_runtime::mesh::beam;
+use tensormass_runtime::mesh::{Mesh, beam};
 use tensormass_runtime::{LawEntry, laws};
 use tensormass_testing::random::Rng;
 
-use crate::states::{Analysis, Bound, Kernel, Vector, batches, body, compare, rest, vectors};
+use crate::meshes::{boxes_beside_wedges, distorted, unit};
+use crate::states::{Analysis, Bound, Kernel, Vector, batches, compare, of_mesh, other_elements, vectors};
 use crate::support::gpu::test_device;
 use crate::{On, on_cpu, on_gpu};
 
@@ -32,7 +33,7 @@ const DAMPING: (f64, f64) = (524_288.0, 0.375);
 /// Where the tests' update keeps the sum.
 const KEPT: usize = 7;
 
-/// A beam of all laws, one material and a material each, whose displacement strains and turns it a little.
+/// A body of some laws, one material and a material each, whose displacement strains and turns it a little.
 struct Shared {
     body: Body,
     u: Vector,
@@ -41,21 +42,27 @@ struct Shared {
 }
 
 impl Shared {
+    /// A beam of linear tetrahedra of all laws.
     fn new(seed: u64) -> Self {
-        let mut rng = Rng::new(seed);
-        let mesh = beam([4.0, 1.0, 1.5], [8, 3, 3], [0.5, -1.0, 2.0]).expect("a beam");
-        let elements: Vec<[u32; 4]> = mesh.tets().iter().map(|t| t.map(|n| n.0)).collect();
         let all: Vec<&'static LawEntry> = laws().iter().collect();
-        let batches = batches(&all, elements.len(), &mut rng);
-        let mut body = body(elements, &rest(&mesh), batches, &mut rng);
+        let mesh = beam([4.0, 1.0, 1.5], [8, 3, 3], [0.5, -1.0, 2.0]).expect("a beam");
+        // Edges are about 0.4 long: strains of up to about 0.1.
+        Self::of(&mesh, &all, 0.02, seed)
+    }
+
+    /// A mesh, with displacements of up to a magnitude.
+    fn of(mesh: &Mesh, laws: &[&'static LawEntry], magnitude: f64, seed: u64) -> Self {
+        let mut rng = Rng::new(seed);
+        let batches = batches(laws, mesh, &mut rng);
+        let mut body = of_mesh(mesh, batches, &mut rng);
         let nodes = mesh.nodes().len();
-        // Every combination of components is imposed at some node, and none at others.
-        let imposed =
-            (0..nodes as u32).flat_map(|n| (0..3).filter(move |c| ((n % 11) >> c) & 1 == 1).map(move |c| (n, c)));
+        let plane = mesh.blocks()[0].info().dimension == 2;
+        // Every combination of components is imposed at some node, and none at others; all of z in the plane.
+        let is_imposed = |n: u32, c: u8| ((n % 11) >> c) & 1 == 1 || (plane && c == 2);
+        let imposed = (0..nodes as u32).flat_map(|n| (0..3).filter(move |&c| is_imposed(n, c)).map(move |c| (n, c)));
         body.constraints = imposed.map(|(node, component)| Constraint { node, component, motion: 0 }).collect();
         body.motions = vec![History::constant(0.0)];
-        // Edges are about 0.4 long: strains of up to about 0.1.
-        let u = vectors(nodes, 0.02, &mut rng);
+        let u = vectors(nodes, magnitude, &mut rng);
         Self { body, u, du: vectors(nodes, 1.0, &mut rng), old: vectors(nodes, 10.0, &mut rng) }
     }
 
@@ -64,7 +71,7 @@ impl Shared {
         let mut sums: Vec<Sum> = old.iter().map(|_| Sum::default()).collect();
         for batch in self.body.batches.iter().filter(|batch| kernel.is_of(batch.law)) {
             let values = analysis.batch(kernel, &self.body, batch, &self.u, &self.du);
-            for (&e, slots) in batch.elements.iter().zip(values.chunks(12)) {
+            for (&e, slots) in batch.elements.iter().zip(values.chunks(3 * batch.element.info.nodes)) {
                 for (node, slot) in self.body.elements[e as usize].iter().zip(slots.chunks(3)) {
                     (0..3).for_each(|c| sums[3 * *node as usize + c].add(slot[c]));
                 }
@@ -212,6 +219,29 @@ fn sums_at_nodes_are_those_of_f64_rounded() {
         let run = || check(&gpu, &body, GpuOptions { binding_bytes, ..GpuOptions::default() }, &analysis, least);
         let first = run();
         assert!(first == run(), "a second run gives other bits");
+    }
+}
+
+/// Any element, and two kinds that share nodes; of laws that between them have all that a law can have.
+#[test]
+fn sums_of_every_element_are_those_of_f64_rounded() {
+    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let analysis = Analysis::new();
+    let some = |has: &dyn Fn(&LawEntry) -> bool| laws().iter().find(|law| has(law)).expect("a law of that kind");
+    let two = [some(&|law| law.info.domain.is_some()), some(&|law| law.damping.is_some())];
+    let mixed = distorted(&boxes_beside_wedges(3), 0.3, 17);
+    for mesh in other_elements().map(|element| distorted(&unit(element, 3), 0.3, 5)).chain([mixed]) {
+        let kinds: Vec<&str> = mesh.blocks().iter().map(|b| b.info().name).collect();
+        println!("{}", kinds.join(" and "));
+        // Nodes of quadratic elements are about 1/6 apart.
+        let body = Shared::of(&mesh, &two, 0.005, 5);
+        // A page has the slopes of its reference elements, too: room for those of one kind and half of all points.
+        let table = |batch: &LawBatch| batch.element.info.points.len() * (batch.element.info.nodes - 1);
+        let table = body.body.batches.iter().map(table).max().expect("a batch");
+        let half = (16 * table + 24 * body.body.rest.values().len()) as u64;
+        for (least, binding_bytes) in [(1, None), (2, Some(half))] {
+            check(&gpu, &body, GpuOptions { binding_bytes, ..GpuOptions::default() }, &analysis, least);
+        }
     }
 }
 

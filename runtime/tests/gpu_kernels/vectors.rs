@@ -22,8 +22,9 @@ const MOTIONS: [f64; 3] = [0.25, -3.5, 0.0];
 
 /// Constraints at some nodes: every combination of components, each component following one of the motions.
 fn constrained(nodes: usize) -> Body {
-    let rest = [RestPoint { inverse_jacobian: [0.0; 9], weight: 1.0 }];
-    let mut body = body(vec![[0, 0, 0, nodes as u32 - 1]], &rest, vec![], &mut Rng::new(0));
+    let rest = [[RestPoint { inverse_jacobian: [0.0; 9], weight: 1.0 }]].into_iter().collect();
+    let elements = [[0, 0, 0, nodes as u32 - 1]].into_iter().collect();
+    let mut body = body(elements, &rest, vec![], &mut Rng::new(0));
     (body.elements, body.rest) = Default::default();
     let components = (0..nodes as u32).flat_map(|n| (0..3u8).map(move |c| (n, c)));
     let imposed = components.filter(|(n, c)| ((n % 9) >> c) & 1 == 1);

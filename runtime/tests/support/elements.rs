@@ -2,10 +2,10 @@
 #![allow(dead_code)] // every test links its own copy and uses a part of it
 
 use tensormass_kernels::{ElementEntry, ElementInfo, elements};
-use tensormass_runtime::mesh::{Mesh, NodeId, beam_of};
+use tensormass_runtime::mesh::{Block, Groups, Mesh, NodeId, beam_of};
 use tensormass_testing::codegen::element::{ElementDeclaration, Shape, declarations};
 
-use super::Random;
+use crate::support::Random;
 
 /// The elements of which bodies of this dimension can be made.
 pub fn of_dimension(dimension: usize) -> impl Iterator<Item = &'static ElementEntry> {
@@ -16,6 +16,22 @@ pub fn of_dimension(dimension: usize) -> impl Iterator<Item = &'static ElementEn
 pub fn unit(element: &'static ElementEntry, n: usize) -> Mesh {
     let thick = if element.info.dimension == 3 { n } else { 1 };
     beam_of(element, [1.0; 3], [n, n, thick], [0.0; 3]).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The unit cube of boxes beside wedges: both are made on one lattice, so that their nodes have the same numbers.
+pub fn boxes_beside_wedges(cells: usize) -> Mesh {
+    let [boxes, wedges] = ["hexahedron_q1", "prism_p1"].map(|name| tensormass_kernels::element(name).expect("shipped"));
+    let [of_boxes, of_wedges] = [boxes, wedges].map(|element| unit(element, cells));
+    assert_eq!(of_boxes.nodes(), of_wedges.nodes());
+    let part = |mesh: &Mesh, each: usize, left: bool| {
+        let block = &mesh.blocks()[0];
+        // Cells follow each other along z, then y, then x.
+        let is_left = |e: usize| e / each / (cells * cells) <= cells / 2;
+        let nodes = block.elements().enumerate().filter(|(e, _)| is_left(*e) == left).flat_map(|(_, n)| n);
+        Block { element: block.element, nodes: nodes.copied().collect() }
+    };
+    let blocks = vec![part(&of_boxes, 1, true), part(&of_wedges, 2, false)];
+    Mesh::new(of_boxes.nodes().to_vec(), blocks, Groups::default()).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// The two corners between which each node lies, or the node itself twice; a corner is a node of the linear element.

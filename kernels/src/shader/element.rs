@@ -1,0 +1,477 @@
+//! Element passes: gather G, evaluate a law's point kernel, contract or store; one invocation some elements.
+//!
+//! What is printed here moves values and adds up quadrature points; all that a law or an element computes is in the
+//! functions that the generator printed. An element with one point has no loop and no sum.
+
+use super::Shader;
+use super::binding::{Binding, declarations};
+use super::functions::{Argument, ElementFunctions, PointFunction};
+use crate::element::{ElementEntry, ElementInfo};
+use crate::law::LawEntry;
+
+/// What an element pass computes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Pass {
+    /// Strain energy of each element.
+    Energy,
+    /// Nodal forces of each element into its slots.
+    Force,
+    /// Nodal force differentials of each element into its slots, unless the solver has stopped.
+    DForce,
+    /// Diagonal of the tangent stiffness at each element's nodes into its slots.
+    Diagonal,
+    /// Cauchy stress of each element.
+    Cauchy,
+    /// Nodal damping forces of each element into its slots.
+    Damping,
+    /// Their differentials by the velocity into the slots.
+    DDamping,
+    /// The diagonal of minus that differential at each element's nodes into its slots.
+    DampingDiagonal,
+}
+
+/// All passes.
+pub const PASSES: [Pass; 8] = [
+    Pass::Energy,
+    Pass::Force,
+    Pass::DForce,
+    Pass::Diagonal,
+    Pass::Cauchy,
+    Pass::Damping,
+    Pass::DDamping,
+    Pass::DampingDiagonal,
+];
+
+/// Storage buffers that WebGPU's default limits allow a pass.
+const MOST_BUFFERS: usize = 8;
+
+/// The arguments that are gradients of nodal vectors: their names in a pass, the function that reads the nodes, and where.
+const GATHERED: [(Argument, &str, &str, &str); 3] = [
+    (Argument::DisplacementGradient, "g", "nodal_displacement", "displacement"),
+    (Argument::GradientRate, "gt", "nodal_velocity", "velocity"),
+    (Argument::GradientIncrement, "dg", "nodal_increment", "increment"),
+];
+
+impl Pass {
+    /// The law's function that the pass evaluates; none of damping where the law has no dissipation.
+    pub fn function(self, law: &LawEntry) -> Option<&'static PointFunction> {
+        let (own, damping) = (law.functions, law.damping.map(|damping| damping.functions));
+        match self {
+            Self::Energy => Some(&own.energy),
+            Self::Force => Some(&own.force),
+            Self::DForce => Some(&own.dforce),
+            Self::Diagonal => Some(&own.diagonal),
+            Self::Cauchy => Some(&own.cauchy),
+            Self::Damping => damping.map(|d| &d.damping),
+            Self::DDamping => damping.map(|d| &d.ddamping),
+            Self::DampingDiagonal => damping.map(|d| &d.diagonal),
+        }
+    }
+
+    fn contracts(self) -> bool {
+        matches!(self, Self::Force | Self::DForce | Self::Damping | Self::DDamping)
+    }
+
+    fn is_diagonal(self) -> bool {
+        matches!(self, Self::Diagonal | Self::DampingDiagonal)
+    }
+}
+
+/// A pass of a law on an element; none of damping where the law has no dissipation.
+pub fn element_pass(law: &LawEntry, element: &ElementEntry, pass: Pass) -> Option<Shader> {
+    let function = pass.function(law)?;
+    let composed = Composed {
+        pass,
+        function,
+        functions: element.functions,
+        info: element.info,
+        constants: law.info.constants.len(),
+    };
+    let bindings = composed.bindings();
+    let text = format!("{}{}", law.functions.banner, composed.module(&bindings));
+    Some(Shader { text, bindings })
+}
+
+/// One law's function on one element.
+struct Composed<'a> {
+    pass: Pass,
+    function: &'a PointFunction,
+    functions: &'a ElementFunctions,
+    info: &'a ElementInfo,
+    constants: usize,
+}
+
+impl Composed<'_> {
+    fn reads(&self, argument: Argument) -> bool {
+        self.function.arguments.contains(&argument)
+    }
+
+    fn gathered(&self) -> impl Iterator<Item = (&'static str, &'static str, &'static str)> {
+        GATHERED
+            .iter()
+            .filter(|(argument, ..)| self.reads(*argument))
+            .map(|(_, name, reader, of)| (*name, *reader, *of))
+    }
+
+    fn gathers(&self) -> bool {
+        self.gathered().next().is_some()
+    }
+
+    /// Whether there is one quadrature point: nothing is added up.
+    fn is_single(&self) -> bool {
+        self.info.points.len() == 1
+    }
+
+    fn gradients(&self) -> bool {
+        self.gathers() || self.pass.contracts() || self.reads(Argument::NodeGradient)
+    }
+
+    fn weight(&self) -> bool {
+        self.pass != Pass::Cauchy || !self.is_single()
+    }
+
+    fn slots(&self) -> bool {
+        self.pass.contracts() || self.pass.is_diagonal()
+    }
+
+    fn margin(&self) -> bool {
+        self.function.field.is_some()
+    }
+
+    fn bindings(&self) -> Vec<Binding> {
+        let all = [
+            (true, Binding::ElementPass),
+            (self.gathers(), Binding::Nodes),
+            (self.gradients() || self.weight(), Binding::Rest),
+            (self.reads(Argument::Constants), Binding::Constants),
+            (self.reads(Argument::DisplacementGradient), Binding::Displacement),
+            (self.reads(Argument::GradientRate), Binding::Velocity),
+            (self.reads(Argument::GradientIncrement), Binding::Increment),
+            (self.slots(), Binding::Slots),
+            (self.slots(), Binding::SlotIndex),
+            (self.margin(), Binding::Margins),
+            (self.pass == Pass::Energy, Binding::Energies),
+            (self.pass == Pass::Cauchy, Binding::Stresses),
+            (self.pass == Pass::DForce, Binding::Gate),
+        ];
+        let mut bindings: Vec<Binding> =
+            all.into_iter().filter_map(|(needed, binding)| needed.then_some(binding)).collect();
+        // Where there is no room for the gate the pass runs in vain once a solver has stopped: nobody reads its slots.
+        if self.pass == Pass::DDamping && bindings.len() <= MOST_BUFFERS {
+            bindings.push(Binding::Gate);
+        }
+        bindings
+    }
+
+    fn module(&self, bindings: &[Binding]) -> String {
+        let stride = if bindings.contains(&Binding::Constants) { STRIDE } else { "" };
+        let mut out = format!("{OVERRIDES}{stride}\n{}", declarations(bindings));
+        if self.gradients() {
+            out += &if self.info.is_linear_simplex { shape_gradients() } else { self.mapping() };
+        }
+        for (_, reader, of) in self.gathered() {
+            out += &self.gather(reader, of);
+        }
+        let functions = [
+            (self.gathers(), self.functions.gradient),
+            (self.reads(Argument::NodeGradient), self.functions.node_gradients),
+            (self.pass.contracts(), self.functions.contract),
+        ];
+        out.extend(functions.into_iter().filter_map(|(needed, text)| needed.then_some(text)));
+        out += self.function.text;
+        out += &self.one_element();
+        out + &entry_point(bindings.contains(&Binding::Gate))
+    }
+
+    /// Where node j of an element stands in an array of four nodes an entry.
+    fn place(j: usize) -> String {
+        format!("[{}].{}", j / 4, ["x", "y", "z", "w"][j % 4])
+    }
+
+    /// The type, and the value at element e, of an array of four nodes an entry.
+    fn by_fours(&self, buffer: &str) -> (String, String) {
+        let entries = self.info.nodes.div_ceil(4);
+        let kind = format!("array<vec4<u32>, {entries}>");
+        let values: Vec<String> = (0..entries).map(|k| format!("{buffer}[{}]", row(k))).collect();
+        (kind.clone(), format!("{kind}({})", values.join(", ")))
+    }
+
+    /// A function that reads the vectors of an element's nodes.
+    fn gather(&self, name: &str, of: &str) -> String {
+        let nodes = 0..self.info.nodes;
+        let values: Vec<String> = nodes.clone().flat_map(|j| ["x", "y", "z"].map(|k| format!("u{j}.{k}"))).collect();
+        let (kind, _) = self.by_fours("nodes");
+        let mut out = Lines::new(&format!("fn {name}(node: {kind}) -> array<f32, {}> {{", values.len()));
+        nodes.for_each(|j| out.line(&format!("let u{j} = {of}[node{}];", Self::place(j))));
+        out.returns(&values)
+    }
+
+    /// The functions that read a point's slopes and J^-1.
+    fn mapping(&self) -> String {
+        let ElementInfo { nodes, dimension, points, .. } = self.info;
+        let names = &["x", "y", "z"][..*dimension];
+        let values: Vec<String> = (1..*nodes).flat_map(|j| names.iter().map(move |k| format!("s{j}.{k}"))).collect();
+        let comment = "// dLambda_1/dxi, dLambda_2/dxi, ... at a quadrature point.";
+        let mut slopes = Lines::new(&format!("{comment}\nfn slopes(q: u32) -> array<f32, {}> {{", values.len()));
+        slopes.line(&format!("let first = {}u * element_pass.elements + {}u * q;", 3 * points.len(), nodes - 1));
+        slopes.line("let s1 = rest[first];");
+        (2..*nodes).for_each(|j| slopes.line(&format!("let s{j} = rest[first + {}u];", j - 1)));
+        let comment = "// J^-1 at a quadrature point (1/m).";
+        let mut inverse = Lines::new(&format!("{comment}\nfn inverse_jacobian(e: u32, q: u32) -> array<f32, 9> {{"));
+        inverse.line("let first = 3u * q * element_pass.elements + e;");
+        inverse.line("let r0 = rest[first];");
+        inverse.line("let r1 = rest[first + element_pass.elements];");
+        inverse.line("let r2 = rest[first + 2u * element_pass.elements];");
+        let rows: Vec<String> = (0..3).flat_map(|j| ["x", "y", "z"].map(|k| format!("r{j}.{k}"))).collect();
+        slopes.returns(&values) + &inverse.returns(&rows)
+    }
+
+    /// What a pass passes to an element's functions for the gradients at a point.
+    fn geometry(&self) -> &'static str {
+        if self.info.is_linear_simplex { "b" } else { "s, j" }
+    }
+
+    /// The call of the law's function; `node_gradient` is the expression of the gradient at one node.
+    fn call(&self, node_gradient: &str) -> String {
+        let name = |argument: &Argument| match argument {
+            Argument::Constants => "c",
+            Argument::DisplacementGradient => "g",
+            Argument::GradientRate => "gt",
+            Argument::GradientIncrement => "dg",
+            Argument::NodeGradient => node_gradient,
+        };
+        let arguments: Vec<&str> = self.function.arguments.iter().map(name).collect();
+        format!("{}({})", self.function.name, arguments.join(", "))
+    }
+
+    /// The function that computes one element.
+    fn one_element(&self) -> String {
+        let mut out = Lines::new("fn element(e: u32) {");
+        if self.gathers() {
+            out.line(&format!("let node = {};", self.by_fours("nodes").1));
+        }
+        for (name, reader, _) in self.gathered() {
+            out.line(&format!("let nodal_{name} = {reader}(node);"));
+        }
+        if self.reads(Argument::Constants) {
+            out.line("let first = constants_stride * e;");
+            let entry = |k| if k == 0 { "constants[first]".to_string() } else { format!("constants[first + {k}u]") };
+            out.line(&format!("let c = {};", array(&(0..self.constants).map(entry).collect::<Vec<_>>())));
+        }
+        if self.is_single() {
+            self.point(&mut out);
+        } else {
+            for sum in self.sums() {
+                out.line(&sum);
+            }
+            out.open(&format!("for (var q = 0u; q < {}u; q++) {{", self.info.points.len()));
+            self.point(&mut out);
+            out.close();
+        }
+        self.store(&mut out);
+        out.close();
+        out.text
+    }
+
+    /// What is added up over the points of an element with several.
+    fn sums(&self) -> Vec<String> {
+        let mut sums = match self.pass {
+            Pass::Energy => vec!["var integral = 0.0f;".to_string()],
+            Pass::Cauchy => vec!["var sigma = array<f32, 9>();".to_string(), "var volume = 0.0f;".to_string()],
+            _ => vec![format!("var f = array<f32, {}>();", 3 * self.info.nodes)],
+        };
+        if self.margin() {
+            // No margin is greater.
+            sums.push("var margin = 3.4028235e38f;".into());
+        }
+        sums
+    }
+
+    /// What is computed at one quadrature point, q where there are several.
+    fn point(&self, out: &mut Lines) {
+        let single = self.is_single();
+        if self.gradients() {
+            if self.info.is_linear_simplex {
+                out.line("let b = shape_gradients(e);");
+            } else {
+                let q = if single { "0u" } else { "q" };
+                out.line(&format!("let s = slopes({q});"));
+                out.line(&format!("let j = inverse_jacobian(e, {q});"));
+            }
+        }
+        if self.weight() {
+            out.line(if single { "let w = rest[e].w;" } else { "let w = rest[3u * q * element_pass.elements + e].w;" });
+        }
+        for (name, ..) in self.gathered() {
+            out.line(&format!("let {name} = gradient(nodal_{name}, {});", self.geometry()));
+        }
+        if self.pass.is_diagonal() {
+            return self.diagonal(out);
+        }
+        out.line(&format!("let point = {};", self.call("")));
+        let value = self.function.field.map_or("point".to_string(), |field| format!("point.{field}"));
+        match (self.pass, single) {
+            (Pass::Energy, true) => out.line(&format!("let integral = {value} * w;")),
+            (Pass::Energy, false) => out.line(&format!("integral += {value} * w;")),
+            (Pass::Cauchy, true) => out.line(&format!("let sigma = {value};")),
+            (Pass::Cauchy, false) => {
+                (0..9).for_each(|k| out.line(&format!("sigma[{k}] += {value}[{k}] * w;")));
+                out.line("volume += w;");
+            }
+            (_, true) => out.line(&format!("let f = contract({value}, {}, w);", self.geometry())),
+            (_, false) => {
+                out.line(&format!("let part = contract({value}, {}, w);", self.geometry()));
+                (0..3 * self.info.nodes).for_each(|k| out.line(&format!("f[{k}] += part[{k}];")));
+            }
+        }
+        if self.margin() {
+            out.line(if single { "let margin = point.margin;" } else { "margin = min(margin, point.margin);" });
+        }
+    }
+
+    /// The diagonal at each node; nodes of an element with several points in a loop, because a law's function is long.
+    fn diagonal(&self, out: &mut Lines) {
+        let at = |k: [String; 3]| format!("array<f32, 3>({})", k.map(|k| format!("n[{k}]")).join(", "));
+        let keyword = if self.is_single() { "let" } else { "var" };
+        if self.reads(Argument::NodeGradient) {
+            out.line(&format!("{keyword} n = node_gradients({});", self.geometry()));
+        }
+        if !self.is_single() {
+            out.open(&format!("for (var k = 0u; k < {}u; k += 3u) {{", 3 * self.info.nodes));
+            let places = ["k", "k + 1u", "k + 2u"].map(String::from);
+            out.line(&format!("let d = {};", self.call(&at(places.clone()))));
+            for (i, k) in places.iter().enumerate() {
+                out.line(&format!("f[{k}] += w * d[{i}];"));
+            }
+            return out.close();
+        }
+        let nodes = 0..self.info.nodes;
+        for a in nodes.clone() {
+            out.line(&format!("let d{a} = {};", self.call(&at([0, 1, 2].map(|i| (3 * a + i).to_string())))));
+        }
+        let values: Vec<String> = nodes.flat_map(|a| [0, 1, 2].map(|i| format!("w * d{a}[{i}]"))).collect();
+        out.line(&format!("let f = {};", array(&values)));
+    }
+
+    /// Stores what the points gave.
+    fn store(&self, out: &mut Lines) {
+        match self.pass {
+            Pass::Energy => out.line("energies[e] = integral;"),
+            Pass::Cauchy => {
+                let part = if self.is_single() { "" } else { " / volume" };
+                for k in 0..9 {
+                    out.line(&format!("stresses[9u * e + {k}u] = sigma[{k}]{part};"));
+                }
+            }
+            _ => {
+                out.line(&format!("let slot = {};", self.by_fours("slot_index").1));
+                for j in 0..self.info.nodes {
+                    let [x, y, z] = [3 * j, 3 * j + 1, 3 * j + 2];
+                    let place = Self::place(j);
+                    out.line(&format!("slots[slot{place}] = vec4<f32>(f[{x}], f[{y}], f[{z}], 0.0f);"));
+                }
+            }
+        }
+        if self.margin() {
+            out.line("margins[e] = margin;");
+        }
+    }
+}
+
+/// A function's text.
+struct Lines {
+    text: String,
+    depth: usize,
+}
+
+impl Lines {
+    fn new(head: &str) -> Self {
+        Self { text: format!("\n{head}\n"), depth: 1 }
+    }
+
+    /// A statement; the lines of a long one are set in as deep.
+    fn line(&mut self, text: &str) {
+        let indent = "    ".repeat(self.depth);
+        for line in text.lines() {
+            self.text += &format!("{indent}{line}\n");
+        }
+    }
+
+    fn open(&mut self, head: &str) {
+        self.line(head);
+        self.depth += 1;
+    }
+
+    fn close(&mut self) {
+        self.depth -= 1;
+        self.line("}");
+    }
+
+    /// The whole function, which returns an array.
+    fn returns(mut self, values: &[String]) -> String {
+        self.line(&format!("return {};", array(values)));
+        self.close();
+        self.text
+    }
+}
+
+/// The place of element e in block k of a buffer that has one entry an element in each block.
+fn row(k: usize) -> String {
+    match k {
+        0 => "e".to_string(),
+        1 => "element_pass.elements + e".to_string(),
+        _ => format!("{k}u * element_pass.elements + e"),
+    }
+}
+
+/// An array's constructor, three values a line.
+fn array(values: &[String]) -> String {
+    let lines: String = values.chunks(3).map(|line| format!("    {},\n", line.join(", "))).collect();
+    format!("array<f32, {}>(\n{lines})", values.len())
+}
+
+/// The function that reads the gradients of a linear tetrahedron.
+fn shape_gradients() -> String {
+    let comment = "// grad Lambda_1, grad Lambda_2, ... of an element (1/m).";
+    let mut out = Lines::new(&format!("{comment}\nfn shape_gradients(e: u32) -> array<f32, 9> {{"));
+    (0..3).for_each(|k| out.line(&format!("let g{} = rest[{}];", k + 1, row(k))));
+    out.returns(&(1..4).flat_map(|j| ["x", "y", "z"].map(|k| format!("g{j}.{k}"))).collect::<Vec<_>>())
+}
+
+const OVERRIDES: &str = "\
+override work_group_size: u32 = 64u;
+// Elements that one invocation computes, one after the other.
+override elements_per_invocation: u32 = 1u;
+";
+
+const STRIDE: &str = "\
+// Constants between one element's set and the next; 0 where all share one, which a compiler can then load once.
+override constants_stride: u32 = 0u;
+";
+
+fn entry_point(gated: bool) -> String {
+    let gate = if gated { "    if gate[0] == 0.0f {\n        return;\n    }\n" } else { "" };
+    format!(
+        "
+@compute @workgroup_size(work_group_size)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {{
+{gate}    let invocations = groups.x * groups.y * work_group_size;
+    let e = (group.y * groups.x + group.x) * work_group_size + local;
+    if e < element_pass.elements {{
+        element(e);
+    }}
+    // Not one loop for all: where an invocation has one element, nothing of a loop may be left.
+    for (var i = 1u; i < elements_per_invocation; i++) {{
+        let next = e + i * invocations;
+        if next < element_pass.elements {{
+            element(next);
+        }}
+    }}
+}}
+"
+    )
+}
