@@ -31,6 +31,10 @@ pub struct ElementInfo {
     pub is_linear_simplex: bool,
     /// The quadrature points.
     pub points: &'static [ReferencePoint],
+    /// The interpolation functions Lambda_j.
+    pub functions: &'static [&'static [Term]],
+    /// Reference coordinates and weights of a rule by which products of two functions are integrated exactly.
+    pub mass_rule: &'static [([f64; 3], f64)],
     /// Each node's part of a lumped mass: positive, and 1 in all.
     pub lumping: &'static [f64],
     /// VTK's cell type, and the node that stands at each of its places.
@@ -43,6 +47,33 @@ pub struct ElementInfo {
     pub gradient_operations: u32,
     /// Additions, multiplications and divisions of the contraction at one point.
     pub contract_operations: u32,
+}
+
+/// A term of a polynomial: its coefficient times powers of the reference coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Term {
+    /// The coefficient.
+    pub coefficient: f64,
+    /// The powers.
+    pub exponents: [u32; 3],
+}
+
+impl ElementInfo {
+    /// Lambda_j and dLambda_j/dxi of each node at reference coordinates.
+    pub fn functions_at(&self, xi: [f64; 3]) -> (Vec<f64>, Vec<[f64; 3]>) {
+        let power = |k: usize, n: u32| xi[k].powi(n as i32);
+        let value = |t: &Term| (0..3).fold(t.coefficient, |product, k| product * power(k, t.exponents[k]));
+        let slope = |t: &Term, by: usize| match t.exponents[by] {
+            0 => 0.0,
+            n => (0..3).fold(t.coefficient * f64::from(n), |product, k| {
+                product * power(k, if k == by { n - 1 } else { t.exponents[k] })
+            }),
+        };
+        let sum = |f: &[Term], of: &dyn Fn(&Term) -> f64| f.iter().map(of).sum::<f64>();
+        let values = self.functions.iter().map(|f| sum(f, &value)).collect();
+        let slopes = self.functions.iter().map(|f| std::array::from_fn(|by| sum(f, &|t| slope(t, by)))).collect();
+        (values, slopes)
+    }
 }
 
 /// A quadrature point of an element.

@@ -19,7 +19,7 @@ pub mod shader;
 
 pub use composed::{Composed, ComposedBatch};
 pub use damping::{DampingEntry, DampingKernels, Dissipative};
-pub use element::{Element, ElementEntry, ElementInfo, Face, Numbering, ReferencePoint, RestPoint};
+pub use element::{Element, ElementEntry, ElementInfo, Face, Numbering, ReferencePoint, RestPoint, Term};
 pub use law::{Acceptance, BatchKernels, Law, LawEntry, LawInfo, LawSource, Operations, ParameterInfo, Structure};
 pub use real::Real;
 // Generated text computes constants in it.

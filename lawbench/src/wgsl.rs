@@ -172,6 +172,7 @@ mod gpu {
                 .collect(),
             batches: vec![batch],
             masses: vec![1.0; 4 * count],
+            mass_matrix: None,
             element_masses: vec![1.0; count],
             constraints: vec![],
             motions: vec![],

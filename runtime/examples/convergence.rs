@@ -11,7 +11,7 @@ mod support;
 
 use elements::of_dimension;
 use manufactured::solve;
-use support::{CANTILEVER, Random, body, done, parameters, probe, scene, system};
+use support::{CANTILEVER, body, done, parameters, probe, scene, system};
 use tensormass_runtime::laws;
 
 fn main() {

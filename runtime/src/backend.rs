@@ -6,6 +6,7 @@
 //! [`Backend::Registers`], where the vectors live, and gives its recurrences as [`Update`]s.
 
 use crate::device::DeviceError;
+use crate::mass::{MassMatrix, Masses};
 
 /// An element has left the domain of its law: the state is not one that the law describes.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -73,6 +74,8 @@ pub trait Backend {
     type Vector;
     /// [`REGISTERS`] numbers of a solver, where the vectors live.
     type Registers;
+    /// A matrix over the nodes, the same for each component.
+    type Matrix;
 
     /// A vector of zeros.
     fn zeros(&self) -> Self::Vector;
@@ -92,6 +95,10 @@ pub trait Backend {
     fn scale(&self, b: f64, y: &mut Self::Vector);
     /// y += a d x, component by component.
     fn multiply_add(&self, a: f64, d: &Self::Vector, x: &Self::Vector, y: &mut Self::Vector);
+    /// The mass matrix of the body for which the backend was made.
+    fn matrix(&self, matrix: &MassMatrix) -> Self::Matrix;
+    /// y += a M x.
+    fn add_product(&self, a: f64, matrix: &Self::Matrix, x: &Self::Vector, y: &mut Self::Vector);
     /// y = x / d, component by component.
     fn divide(&self, x: &Self::Vector, d: &Self::Vector, y: &mut Self::Vector);
     /// The sum of x_i y_i over all components, in a fixed order.
@@ -171,10 +178,10 @@ pub struct Counts {
     pub bytes_read: u64,
 }
 
-/// A = mass M + stiffness K + damping, K at the state to which a field is prepared; M is diagonal.
+/// A = mass M + stiffness K + damping, K at the state to which a field is prepared.
 pub struct Operator<'a, B: Backend> {
-    /// Lumped masses, one entry a component.
-    pub masses: &'a B::Vector,
+    /// M.
+    pub masses: &'a Masses<B>,
     /// Factor m of M.
     pub mass: f64,
     /// Factor k of K.
@@ -212,7 +219,7 @@ impl<B: Backend> Operator<'_, B> {
             }
         }
         if self.mass != 0.0 {
-            backend.multiply_add(self.mass, self.masses, x, y);
+            self.masses.add(backend, self.mass, x, y);
         }
         backend.project(y);
     }
@@ -222,7 +229,7 @@ impl<B: Backend> Operator<'_, B> {
         backend.clear(d);
         field.add_diagonal(backend, self.stiffness, d);
         self.damping_diagonal(backend, field, d);
-        backend.axpy(self.mass, self.masses, d);
+        backend.axpy(self.mass, self.masses.diagonal(), d);
     }
 }
 

@@ -7,6 +7,7 @@ use std::ops::Index;
 use tensormass_kernels::{ElementEntry, LawEntry, RestPoint};
 
 use crate::history::History;
+use crate::mass::MassMatrix;
 
 /// Rows of any lengths, one after the other.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,6 +116,8 @@ pub struct Body {
     pub batches: Vec<LawBatch>,
     /// Lumped mass of each node.
     pub masses: Vec<f64>,
+    /// The consistent mass, where inertia is not lumped.
+    pub mass_matrix: Option<MassMatrix>,
     /// Mass of each element.
     pub element_masses: Vec<f64>,
     /// Imposed components, ascending by node and component, each once.
@@ -153,15 +156,4 @@ impl Body {
     pub fn is_viscous(&self) -> bool {
         self.batches.iter().any(|b| b.law.damping.is_some())
     }
-}
-
-/// Lumped masses: an element of mass m gives each of its nodes the part of it that its kind declares.
-pub fn lump<'a>(nodes: usize, elements: impl Iterator<Item = (&'a ElementEntry, &'a [u32], f64)>) -> Vec<f64> {
-    let mut masses = vec![0.0; nodes];
-    for (kind, nodes, mass) in elements {
-        for (n, part) in nodes.iter().zip(kind.info.lumping) {
-            masses[*n as usize] += mass * part;
-        }
-    }
-    masses
 }

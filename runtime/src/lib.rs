@@ -18,6 +18,7 @@ mod frames;
 pub mod gpu;
 pub mod history;
 pub mod integrate;
+pub mod mass;
 pub mod mesh;
 pub mod model;
 pub mod output;

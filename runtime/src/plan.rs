@@ -97,6 +97,8 @@ impl Plan {
         let fours: usize = model.body.batches.iter().map(|b| b.elements.len() * b.element.info.nodes.div_ceil(4)).sum();
         let mapped = model.body.batches.iter().map(|b| b.element.info).filter(|info| !info.is_linear_simplex);
         let slopes: usize = mapped.map(|info| info.points.len() * (info.nodes - 1)).sum();
+        let matrix = model.body.mass_matrix.as_ref();
+        let (entries, rows) = matrix.map_or((0, 0), |m| (m.values.len(), m.offsets.len()));
         let vectors = if implicit { 20 + 2 * usize::from(viscous || proportional) } else { 6 };
         let constants: usize = model.body.batches.iter().map(|b| b.constants.len()).sum();
         let with_domain = model.body.batches.iter().filter(|b| b.law.info.domain.is_some());
@@ -114,6 +116,7 @@ impl Plan {
                     ("partial forces", 3 * real * slots),
                     ("node slots", 4 * (slots + nodes + 1)),
                     ("state and work vectors", vectors * 3 * real * nodes),
+                    ("consistent mass", (4 + real) * entries + 4 * rows),
                 ]
             }
             Layout::Gpu => vec![
@@ -124,6 +127,7 @@ impl Plan {
                 ("slots of elements and nodes", 16 * fours + 4 * (nodes + 1)),
                 ("margins of domains", 4 * margins),
                 ("state and work vectors", (vectors + 1) * 16 * nodes),
+                ("consistent mass", 8 * entries + 4 * rows),
             ],
         };
         let buffers = buffers.into_iter().filter(|(_, bytes)| *bytes > 0).collect();
@@ -152,6 +156,9 @@ impl Plan {
                     "CG iteration 5: turn, and whether to stop",
                     "CG iteration 6: nodes: next direction",
                 ]),
+            }
+            if matrix.is_some() {
+                passes.push("CG: nodes: product with the consistent mass");
             }
             if viscous {
                 passes.push("CG: elements: partial differentials of damping forces, nodes: product");
@@ -244,7 +251,8 @@ fn scope(scene: &Scene, model: &Model, implicit: bool) -> (Vec<String>, Vec<Stri
         if included { modelled.push(yes) } else { left_out.push(no.to_string()) }
     };
     let inertia = scene.solver.integrator != Integrator::Static;
-    say(inertia, "inertia (lumped masses)".into(), "inertia: static equilibrium");
+    let masses = if model.body.mass_matrix.is_some() { "consistent masses" } else { "lumped masses" };
+    say(inertia, format!("inertia ({masses})"), "inertia: static equilibrium");
     say(scene.solver.mass_damping > 0.0 && inertia, "mass damping".into(), "damping: solver.mass_damping is 0");
     say(
         scene.solver.stiffness_damping > 0.0 && inertia,

@@ -3,6 +3,7 @@
 use crate::backend::{Backend, ForceField, LeftDomain};
 use crate::body::Body;
 use crate::device::DeviceError;
+use crate::mass::Masses;
 
 /// Displacement and velocity at a time; positions are never stored.
 pub struct State<B: Backend> {
@@ -61,8 +62,8 @@ pub struct System<B: Backend, F: ForceField<B>> {
     pub field: F,
     /// The body in scaled units.
     pub body: Body,
-    /// Lumped masses, one entry a component.
-    pub masses: B::Vector,
+    /// M.
+    pub masses: Masses<B>,
     loads: Vec<B::Vector>,
 }
 
@@ -73,8 +74,10 @@ const DIVERGED: f64 = 1e4;
 impl<B: Backend, F: ForceField<B>> System<B, F> {
     /// Puts a body on a backend.
     pub fn new(backend: B, field: F, body: Body) -> Self {
-        let masses: Vec<[f64; 3]> = body.masses.iter().map(|&m| [m; 3]).collect();
-        let masses = backend.upload(&masses);
+        let masses = match &body.mass_matrix {
+            Some(matrix) => Masses::consistent(&backend, matrix),
+            None => Masses::lumped(backend.upload(&body.masses.iter().map(|&m| [m; 3]).collect::<Vec<_>>())),
+        };
         let loads = body.loads.iter().map(|l| backend.upload(&l.forces)).collect();
         Self { backend, field, body, masses, loads }
     }
@@ -128,7 +131,7 @@ impl<B: Backend, F: ForceField<B>> System<B, F> {
     /// v . M v / 2.
     pub fn kinetic_energy(&self, v: &B::Vector) -> f64 {
         let mut p = self.backend.zeros();
-        self.backend.multiply_add(0.5, &self.masses, v, &mut p);
+        self.masses.add(&self.backend, 0.5, v, &mut p);
         self.backend.dot(&p, v)
     }
 

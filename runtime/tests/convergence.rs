@@ -8,7 +8,7 @@ mod support;
 
 use elements::of_dimension;
 use manufactured::{orders, solve};
-use support::{Random, body, parameters, system};
+use support::{body, parameters, system};
 use tensormass_runtime::laws;
 
 /// How far an order measured on meshes this coarse may be below that of the limit.

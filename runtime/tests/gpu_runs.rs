@@ -16,6 +16,7 @@ use tensormass_runtime::cg::{CgLimits, CgOutcome, ConjugateGradient};
 use tensormass_runtime::device::DeviceError;
 use tensormass_runtime::gpu::{Gpu, GpuBackend, GpuField, GpuOptions};
 use tensormass_runtime::laws;
+use tensormass_runtime::mass::Masses;
 use tensormass_runtime::mesh::beam;
 use tensormass_runtime::scene::Scene;
 use tensormass_runtime::simulate::{Ending, Observer, Outcome, RunError, Silent, run_on};
@@ -113,7 +114,7 @@ fn every_element_with_every_kind_of_integrator() {
     let newton = "newton = { tolerance = 1e-5, max_iterations = 20 }";
     let solvers = [
         "integrator = \"semi-implicit-euler\"\nstep = 1e-4\nduration = 0.01\nstiffness_damping = 1e-4".to_string(),
-        format!("integrator = \"implicit-euler\"\nstiffness_damping = 0.01\n{implicit}\n{newton}"),
+        format!("integrator = \"implicit-euler\"\nmass = \"consistent\"\nmass_damping = 1.0\n{implicit}\n{newton}"),
         format!("integrator = \"static\"\n{implicit}\n{newton}"),
     ];
     let law = laws().iter().find(|law| law.damping.is_some() || law.info.domain.is_some()).expect("such a law");
@@ -187,7 +188,7 @@ fn the_solver_reads_once_a_submission() {
             let options = GpuOptions { iterations_per_submission: k, ..GpuOptions::default() };
             let backend = GpuBackend::new(Arc::clone(&gpu), &body, options).expect("it fits");
             let mut field = GpuField::new(&backend, &body).expect("it fits");
-            let masses = backend.upload(&body.masses.iter().map(|&m| [m; 3]).collect::<Vec<_>>());
+            let masses = Masses::lumped(backend.upload(&body.masses.iter().map(|&m| [m; 3]).collect::<Vec<_>>()));
             let b = backend.upload(&vec![[0.0, 0.0, -1e3]; body.masses.len()]);
             let ones = backend.upload(&vec![[1.0; 3]; body.masses.len()]);
             let rest = backend.zeros();

@@ -6,6 +6,7 @@ use serde::Deserialize;
 use crate::ir::{Number, Rational};
 
 use super::ElementError;
+use super::fine;
 use super::polynomial::{self, Polynomial};
 use super::rank;
 use super::shape::{SHAPES, Shape};
@@ -29,6 +30,8 @@ pub struct ElementDeclaration {
     pub functions: Vec<Polynomial>,
     /// How functions over the element are integrated.
     pub quadrature: Quadrature,
+    /// How products of its functions are integrated, which its masses are.
+    pub mass_rule: Quadrature,
     /// The part of the element's mass that each node bears where masses are lumped: positive, and 1 in all.
     pub lumping: Vec<Rational>,
     /// VTK's cell type, and which node stands at each of its places.
@@ -150,6 +153,7 @@ impl ElementDeclaration {
             nodes,
             functions,
             quadrature,
+            mass_rule: fine::rule(shape),
             lumping,
             vtk,
             gmsh,
@@ -226,6 +230,7 @@ impl ElementDeclaration {
                 return Err(format!("its quadrature is not exact for polynomials of degree {}", self::degree(&p)));
             }
         }
+        self.check_masses(allowed)?;
         match rank::hourglass_modes(self) {
             0 => Ok(()),
             free => Err(format!(
@@ -234,6 +239,22 @@ impl ElementDeclaration {
                 points.len()
             )),
         }
+    }
+
+    /// Whether products of functions are integrated exactly.
+    fn check_masses(&self, allowed: f64) -> Result<(), String> {
+        let Quadrature { points, weights, .. } = &self.mass_rule;
+        let values: Vec<Vec<f64>> =
+            points.iter().map(|x| self.functions.iter().map(|f| f.at_f64(x)).collect()).collect();
+        for (i, f) in self.functions.iter().enumerate() {
+            for (j, g) in self.functions.iter().enumerate().take(i + 1) {
+                let sum: f64 = values.iter().zip(weights).map(|(v, w)| w * v[i] * v[j]).sum();
+                if (sum - f64::from_rational(self.shape.integral(&f.product(g)))).abs() > allowed {
+                    return Err("products of its functions are of too high a degree for the rule of masses".into());
+                }
+            }
+        }
+        Ok(())
     }
 
     /// The faces against the elements that they are: each function restricted to a face is the face's function of that node,

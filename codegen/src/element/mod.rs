@@ -11,6 +11,7 @@
 //! strain is plane: nothing depends on z, and nothing moves along it.
 
 mod declaration;
+mod fine;
 mod mapped;
 mod polynomial;
 mod rank;

@@ -161,6 +161,17 @@ fn element_info(element: &ElementKernels) -> TokenStream {
             }
         }
     });
+    let terms = d.functions.iter().map(|f| {
+        let terms = f.terms().map(|(q, e)| {
+            let (coefficient, exponents) = (float(q), e.map(Literal::u32_unsuffixed));
+            quote!(::tensormass_kernels::Term { coefficient: #coefficient, exponents: [#(#exponents),*] })
+        });
+        quote!(&[#(#terms),*])
+    });
+    let masses = d.mass_rule.points.iter().zip(&d.mass_rule.weights).map(|(x, weight)| {
+        let (x, weight) = (x.map(signed), signed(*weight));
+        quote!(([#(#x),*], #weight))
+    });
     let reference = d.nodes.iter().map(|x| {
         let x = x.map(float);
         quote!([#(#x),*])
@@ -179,7 +190,7 @@ fn element_info(element: &ElementKernels) -> TokenStream {
         ::tensormass_kernels::ElementInfo {
             name: #name, docs: #docs, source: #source, shape: #shape, dimension: #dimension, order: #order, nodes: #nodes,
             reference: &[#(#reference),*], is_linear_simplex: #linear, points: &[#(#points),*],
-            lumping: &[#(#lumping),*], vtk: #vtk, gmsh: #gmsh, faces: &[#(#faces),*],
+            functions: &[#(#terms),*], mass_rule: &[#(#masses),*], lumping: &[#(#lumping),*], vtk: #vtk, gmsh: #gmsh, faces: &[#(#faces),*],
             gradient_operations: #gather, contract_operations: #contract,
         }
     }

@@ -6,9 +6,18 @@ use super::Precision;
 use crate::backend::{ALPHA, BETA, Backend, Counts, Descent, REGISTERS, RUNNING, SUM, Update};
 use crate::body::Constraint;
 use crate::device::DeviceError;
+use crate::mass::MassMatrix;
 
 /// Nodes a block: a block's partial sum is formed by one thread, blocks are added in order.
 const BLOCK: usize = 4096;
+
+/// A mass matrix in memory, in compressed rows.
+#[derive(Debug)]
+pub struct CpuMatrix<R> {
+    offsets: Vec<u32>,
+    columns: Vec<u32>,
+    values: Vec<R>,
+}
 
 /// Vectors in memory.
 #[derive(Debug)]
@@ -45,6 +54,7 @@ impl<R: Precision> CpuBackend<R> {
 impl<R: Precision> Backend for CpuBackend<R> {
     type Vector = Vec<[R; 3]>;
     type Registers = [f64; REGISTERS];
+    type Matrix = CpuMatrix<R>;
 
     fn zeros(&self) -> Self::Vector {
         vec![[R::default(); 3]; self.nodes]
@@ -95,6 +105,31 @@ impl<R: Precision> Backend for CpuBackend<R> {
             for ((y, x), d) in y.iter_mut().zip(x).zip(d) {
                 for c in 0..3 {
                     y[c] = y[c] + a * (d[c] * x[c]);
+                }
+            }
+        });
+    }
+
+    fn matrix(&self, matrix: &MassMatrix) -> CpuMatrix<R> {
+        let MassMatrix { offsets, columns, values } = matrix.clone();
+        CpuMatrix { offsets, columns, values: values.into_iter().map(R::from_f64).collect() }
+    }
+
+    fn add_product(&self, a: f64, matrix: &CpuMatrix<R>, x: &Self::Vector, y: &mut Self::Vector) {
+        let a = R::from_f64(a);
+        y.par_chunks_mut(BLOCK).enumerate().for_each(|(block, y)| {
+            for (i, y) in y.iter_mut().enumerate() {
+                let node = block * BLOCK + i;
+                let row = matrix.offsets[node] as usize..matrix.offsets[node + 1] as usize;
+                let mut sum = [R::default(); 3];
+                for (column, value) in matrix.columns[row.clone()].iter().zip(&matrix.values[row]) {
+                    let x = &x[*column as usize];
+                    for c in 0..3 {
+                        sum[c] = sum[c] + *value * x[c];
+                    }
+                }
+                for c in 0..3 {
+                    y[c] = y[c] + a * sum[c];
                 }
             }
         });

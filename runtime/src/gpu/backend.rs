@@ -10,6 +10,7 @@ use std::sync::Arc;
 use crate::backend::{Backend, Counts, Descent, REGISTERS, RUNNING, Update};
 use crate::body::{Body, Constraint};
 use crate::device::DeviceError;
+use crate::mass::MassMatrix;
 
 use super::device::Gpu;
 use super::recorder::{Kernel, Memory, Numbers, Recorder};
@@ -72,6 +73,14 @@ impl Drop for GpuVector {
     }
 }
 
+/// A mass matrix on the device, in compressed rows, f32.
+#[derive(Debug)]
+pub struct GpuMatrix {
+    offsets: Memory,
+    columns: Memory,
+    entries: Memory,
+}
+
 /// Registers of a solver on the device, f32.
 #[derive(Debug)]
 pub struct GpuRegisters(Memory);
@@ -96,6 +105,7 @@ pub struct GpuBackend {
     constrained_nodes: usize,
     motions: usize,
     partials: Memory,
+    gate: Rc<Memory>,
     /// Partial sums that the next update adds up.
     pending: Cell<u32>,
     unused: Rc<RefCell<Vec<Rc<Memory>>>>,
@@ -107,11 +117,14 @@ impl GpuBackend {
     /// A backend for a body.
     ///
     /// # Errors
-    /// A vector over the body's nodes is larger than the device can bind, or the device has failed.
+    /// A vector over the body's nodes or its mass matrix is larger than the device can bind, or the device has failed.
     pub fn new(gpu: Arc<Gpu>, body: &Body, options: GpuOptions) -> Result<Self, DeviceError> {
         let options = options.valid();
         let recorder = Rc::new(Recorder::new(gpu, body.motions.len()));
         let nodes = body.masses.len();
+        // [`Backend::matrix`] cannot refuse it.
+        let entries = body.mass_matrix.as_ref().map_or(0, |matrix| 4 * matrix.values.len() as u64);
+        recorder.fits("the consistent mass", entries)?;
         let (origin, constrained) = constrained(nodes, &body.constraints);
         let largest = nodes.max(body.elements.len());
         // One partial sum a group; two dimensions of groups may make a few more.
@@ -124,6 +137,7 @@ impl GpuBackend {
             constrained_nodes: constrained.len(),
             motions: body.motions.len(),
             partials: recorder.memory("partial sums", 4 * partials as u64)?,
+            gate: Rc::new(recorder.filled("a gate", &open_gate())?),
             recorder,
             options,
             nodes,
@@ -206,6 +220,18 @@ impl GpuBackend {
         self.run(operation, self.numbers(a), storage);
     }
 
+    /// The gate of passes that nothing stops.
+    pub(super) fn gate(&self) -> &Rc<Memory> {
+        &self.gate
+    }
+
+    /// Records y = a M x, or y += a M x; nothing where the gate's solver has stopped.
+    pub(super) fn product(&self, a: f64, m: &GpuMatrix, [x, y]: [&GpuVector; 2], fresh: bool, gate: &Memory) {
+        let numbers = [self.nodes as u32, u32::from(fresh), (a as f32).to_bits(), 0];
+        let storage = [&m.offsets, &m.columns, &m.entries, &*x.memory, &*y.memory, gate];
+        self.run(Operation::Product, numbers, &storage);
+    }
+
     /// Partial sums or maxima over the nodes, read by the host.
     fn reduced(&self, operation: Operation, storage: &[&Memory]) -> Option<Vec<f32>> {
         let [columns, rows] = self.run(operation, self.numbers(0.0), storage);
@@ -231,6 +257,7 @@ fn constrained(nodes: usize, constraints: &[Constraint]) -> (Vec<[f32; 4]>, Vec<
 impl Backend for GpuBackend {
     type Vector = GpuVector;
     type Registers = GpuRegisters;
+    type Matrix = GpuMatrix;
 
     fn zeros(&self) -> GpuVector {
         let mut x = self.vector();
@@ -276,6 +303,20 @@ impl Backend for GpuBackend {
 
     fn multiply_add(&self, a: f64, d: &GpuVector, x: &GpuVector, y: &mut GpuVector) {
         self.each(Operation::MultiplyAdd, a, &[&d.memory, &x.memory, &y.memory]);
+    }
+
+    fn matrix(&self, matrix: &MassMatrix) -> GpuMatrix {
+        let filled = "the backend was made for a body with this matrix";
+        let entries: Vec<f32> = matrix.values.iter().map(|&v| v as f32).collect();
+        GpuMatrix {
+            offsets: self.recorder.filled("rows of the mass", &matrix.offsets).expect(filled),
+            columns: self.recorder.filled("columns of the mass", &matrix.columns).expect(filled),
+            entries: self.recorder.filled("the consistent mass", &entries).expect(filled),
+        }
+    }
+
+    fn add_product(&self, a: f64, matrix: &GpuMatrix, x: &GpuVector, y: &mut GpuVector) {
+        self.product(a, matrix, [x, y], false, &self.gate);
     }
 
     fn divide(&self, x: &GpuVector, d: &GpuVector, y: &mut GpuVector) {
@@ -398,7 +439,7 @@ impl Backend for GpuBackend {
 }
 
 /// The gate of passes that nothing stops: registers of a solver that runs.
-pub(super) fn open_gate() -> [f32; REGISTERS] {
+fn open_gate() -> [f32; REGISTERS] {
     let mut gate = [0.0; REGISTERS];
     gate[RUNNING] = 1.0;
     gate

@@ -14,7 +14,7 @@ use crate::backend::{Backend, ForceField, LeftDomain, Operator};
 use crate::body::{Body, LawBatch};
 use crate::device::DeviceError;
 
-use super::backend::{GpuBackend, GpuRegisters, GpuVector, open_gate};
+use super::backend::{GpuBackend, GpuRegisters, GpuVector};
 use super::page::{Page, Range, pages};
 use super::recorder::{Kernel, Memory, Recorder};
 use super::shaders::{Access, Operation};
@@ -42,7 +42,7 @@ pub struct GpuField {
     slots: Memory,
     /// The displacement at which the tangent is taken; none where no law's tangent depends on it.
     state: Option<GpuVector>,
-    gate: Memory,
+    gate: Rc<Memory>,
     elements: usize,
     /// Element passes by law, kind and the stride of constants, compiled when first needed: a scene has those of its pairs.
     element_passes: HashMap<(&'static str, &'static str, u32, Pass), Rc<Compiled>>,
@@ -86,7 +86,7 @@ impl GpuField {
         let field = Self {
             slots: recorder.memory("partial forces", slot_bytes)?,
             state: state.then(|| backend.zeros()),
-            gate: recorder.filled("a gate", &open_gate())?,
+            gate: Rc::clone(backend.gate()),
             elements: body.elements.len(),
             element_passes: HashMap::new(),
             node_passes: HashMap::new(),
@@ -386,8 +386,13 @@ impl ForceField<GpuBackend> for GpuField {
         registers: &mut GpuRegisters,
     ) {
         let bound = Bound { increment: Some(x.memory()), gate: Some(registers.memory()), ..Bound::default() };
-        let (masses, vectors) = (operator.masses, [x, &*y]);
-        let first = (operator.stiffness, Some(operator.mass));
+        let (masses, vectors) = (operator.masses.diagonal(), [x, &*y]);
+        // Lumped masses come with the first part; the consistent matrix has a pass of its own before it.
+        let lumped = operator.masses.matrix().is_none().then_some(operator.mass);
+        if let Some(matrix) = operator.masses.matrix() {
+            backend.product(operator.mass, matrix, vectors, true, registers.memory());
+        }
+        let first = (operator.stiffness, lumped);
         self.part_of_product(backend, (Of::All, Pass::DForce), &bound, first, masses, vectors);
         if let Some(damping) = &operator.damping {
             let [u, v] = [damping.u, damping.v].map(|vector| Some(vector.memory()));

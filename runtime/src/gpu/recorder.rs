@@ -122,10 +122,7 @@ impl Recorder {
     /// # Errors
     /// It is larger than the device can bind.
     pub(super) fn memory(&self, what: &str, bytes: u64) -> Result<Memory, DeviceError> {
-        let limit = self.gpu.limits().storage_binding_bytes.min(self.gpu.limits().buffer_bytes);
-        if bytes > limit {
-            return Err(DeviceError::TooLarge { what: what.to_string(), bytes, limit });
-        }
+        self.fits(what, bytes)?;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         let size = bytes.max(16).next_multiple_of(4);
         let buffer = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
@@ -135,6 +132,18 @@ impl Recorder {
             mapped_at_creation: false,
         });
         Ok(Memory { id: self.id(), buffer })
+    }
+
+    /// Whether the device can bind a buffer of this size.
+    ///
+    /// # Errors
+    /// It cannot.
+    pub(super) fn fits(&self, what: &str, bytes: u64) -> Result<(), DeviceError> {
+        let limit = self.gpu.limits().storage_binding_bytes.min(self.gpu.limits().buffer_bytes);
+        if bytes > limit {
+            return Err(DeviceError::TooLarge { what: what.to_string(), bytes, limit });
+        }
+        Ok(())
     }
 
     /// A buffer with this content.

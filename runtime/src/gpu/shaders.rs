@@ -26,6 +26,8 @@ pub(super) enum Operation {
     Scale,
     /// y += a d x: d, x, y.
     MultiplyAdd,
+    /// y += a M x, or y = a M x where k is not 0, unless a solver has stopped: offsets, columns, values, x, y, gate.
+    Product,
     /// y = x / d: x, d, y.
     Divide,
     /// Constrained components = 0: y.
@@ -51,12 +53,13 @@ pub(super) enum Operation {
 }
 
 /// All operations.
-pub(super) const OPERATIONS: [Operation; 16] = [
+pub(super) const OPERATIONS: [Operation; 17] = [
     Operation::Copy,
     Operation::Axpy,
     Operation::Xpby,
     Operation::Scale,
     Operation::MultiplyAdd,
+    Operation::Product,
     Operation::Divide,
     Operation::Project,
     Operation::MakePositive,
@@ -92,6 +95,10 @@ const fn vector(name: &'static str, access: Access) -> Argument {
 
 const PARTIALS: Argument = ("partials", "f32", Write);
 const VALUES: Argument = ("values", "f32", Read);
+/// A matrix in compressed rows.
+const OFFSETS: Argument = ("offsets", "u32", Read);
+const COLUMNS: Argument = ("columns", "u32", Read);
+const ENTRIES: Argument = ("entries", "f32", Read);
 /// A constrained node, and the motions that its three components follow.
 const CONSTRAINED: Argument = ("constrained", "vec4<u32>", Read);
 
@@ -118,6 +125,7 @@ impl Operation {
             Self::Copy | Self::Axpy | Self::Xpby => vec![x, y],
             Self::Scale | Self::Project | Self::MakePositive => vec![y],
             Self::MultiplyAdd => vec![d, x, y],
+            Self::Product => vec![OFFSETS, COLUMNS, ENTRIES, x, y, ("gate", "f32", Read)],
             Self::Divide => vec![x, d, y],
             Self::Impose => vec![CONSTRAINED, VALUES, y],
             Self::ImposeChange => vec![CONSTRAINED, VALUES, x, y],
@@ -147,6 +155,22 @@ impl Operation {
             Self::Xpby => update("x[i].xyz + numbers.a * old.xyz"),
             Self::Scale => update("numbers.a * old.xyz"),
             Self::MultiplyAdd => update("old.xyz + numbers.a * (d[i].xyz * x[i].xyz)"),
+            Self::Product => format!(
+                "fn each(i: u32) {{
+    if gate[{RUNNING}] == 0.0f {{
+        return;
+    }}
+    var sum = vec3<f32>(0.0f);
+    let end = offsets[i + 1u];
+    for (var k = offsets[i]; k < end; k++) {{
+        sum += entries[k] * x[columns[k]].xyz;
+    }}
+    let old = y[i];
+    let start = select(old.xyz, vec3<f32>(0.0f), numbers.k != 0u);
+    y[i] = vec4<f32>(start + numbers.a * sum, old.w);
+}}
+{EACH}"
+            ),
             Self::Divide => update("x[i].xyz / d[i].xyz"),
             Self::Project => update(
                 "select(old.xyz, vec3<f32>(0.0f), (vec3<u32>(u32(old.w)) & vec3<u32>(1u, 2u, 4u)) != vec3<u32>(0u))",

@@ -32,7 +32,7 @@ impl<B: Backend, F: ForceField<B>> Integrator<B, F> for SemiImplicitEuler<B> {
         system.force(&state.u, state.time, &mut self.force)?;
         system.add_damping(&state.u, &state.v, &mut self.force);
         let backend = &system.backend;
-        backend.divide(&self.force, &system.masses, &mut self.acceleration);
+        backend.divide(&self.force, system.masses.diagonal(), &mut self.acceleration);
         // Damping -alpha M V at the beginning of the step.
         backend.scale(1.0 - h * system.body.mass_damping, &mut state.v);
         backend.axpy(h, &self.acceleration, &mut state.v);
@@ -73,7 +73,7 @@ impl<B: Backend, F: ForceField<B>> Integrator<B, F> for CentralDifference<B> {
         system.add_damping(&state.u, &state.v, &mut self.force);
         let alpha = system.body.mass_damping;
         let backend = &system.backend;
-        backend.divide(&self.force, &system.masses, &mut self.acceleration);
+        backend.divide(&self.force, system.masses.diagonal(), &mut self.acceleration);
         if !self.started {
             // u(-h) = u_0 - h v_0 + h^2 a_0 / 2 with a_0 = M^-1 f - alpha v_0: the velocity half a step before the start.
             backend.scale(1.0 + 0.5 * h * alpha, &mut state.v);

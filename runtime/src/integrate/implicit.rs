@@ -40,7 +40,7 @@ impl<B: Backend, F: ForceField<B>> Integrator<B, F> for ImplicitEuler<B> {
         backend.impose_change(&velocity, &state.v, &mut self.dv);
         if alpha != 0.0 {
             backend.clear(&mut self.damping);
-            backend.multiply_add(-h * alpha, &system.masses, &state.v, &mut self.damping);
+            system.masses.add(backend, -h * alpha, &state.v, &mut self.damping);
         }
         let equation = Equation {
             mass: 1.0 + h * alpha,

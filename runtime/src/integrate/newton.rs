@@ -6,6 +6,7 @@
 
 use crate::backend::{Backend, Damping, ForceField, LeftDomain, Operator};
 use crate::cg::{CgLimits, CgOutcome, CgReport, ConjugateGradient};
+use crate::mass::Masses;
 use crate::scene::Preconditioner;
 use crate::system::{SolveError, StepReport, System};
 
@@ -98,7 +99,7 @@ impl<B: Backend> Equation<'_, B> {
             backend.axpy(1.0, constant, r);
         }
         if let (Some(x), true) = (x, self.mass != 0.0) {
-            backend.multiply_add(-self.mass, &system.masses, x, r);
+            system.masses.add(backend, -self.mass, x, r);
         }
         backend.project(r);
         Ok(())
@@ -273,7 +274,7 @@ impl<B: Backend> Newton<B> {
 
     /// A at the prepared state and the current rate.
     fn operator<'a>(
-        masses: &'a B::Vector,
+        masses: &'a Masses<B>,
         equation: &Equation<'a, B>,
         damped: &'a Option<Damped<B>>,
     ) -> Operator<'a, B> {
@@ -299,7 +300,7 @@ impl<B: Backend> Newton<B> {
         } else {
             backend.clear(diagonal);
             operator.damping_diagonal(backend, field, diagonal);
-            backend.axpy(equation.mass, &system.masses, diagonal);
+            backend.axpy(equation.mass, system.masses.diagonal(), diagonal);
             if let Some(Damped { elastic, .. }) = &mut self.damped {
                 backend.clear(elastic);
                 field.add_diagonal(backend, stiffness, elastic);
@@ -362,13 +363,13 @@ impl<B: Backend> Newton<B> {
         let damped = &*damped;
         let Operator { masses, mass, stiffness, .. } = Self::operator(&system.masses, equation, damped);
         let mut of = |x: &B::Vector| {
-            // diag(K) x = (D - m M) x / k.
+            // diag(K) x = (D - m diag(M)) x / k.
             backend.clear(product);
             match damped {
                 Some(Damped { elastic, .. }) => backend.multiply_add(1.0 / stiffness, elastic, x, product),
                 None => {
                     backend.multiply_add(1.0 / stiffness, diagonal, x, product);
-                    backend.multiply_add(-mass / stiffness, masses, x, product);
+                    backend.multiply_add(-mass / stiffness, masses.diagonal(), x, product);
                 }
             }
             backend.project(product);

@@ -4,15 +4,15 @@
 //! a body of unit thickness is meant; of a face J has two columns.
 
 use tensormass_kernels::ElementInfo;
-use tensormass_kernels::element::{ReferencePoint, RestPoint};
+use tensormass_kernels::{ReferencePoint, RestPoint};
 
 use super::gradients::{cross, dot, norm, shape_gradients, sub};
 
-/// The columns of J at a point. Edges are differences of positions, taken first: far from the origin nothing more is lost
+/// The columns of J at a point with these slopes. Edges are differences of positions, taken first: far from the origin nothing more is lost
 /// than the positions themselves have lost.
-pub(super) fn jacobian(info: &ElementInfo, point: &ReferencePoint, positions: &[[f64; 3]]) -> [[f64; 3]; 3] {
+pub(super) fn jacobian(info: &ElementInfo, slopes: &[[f64; 3]], positions: &[[f64; 3]]) -> [[f64; 3]; 3] {
     let mut columns = [[0.0; 3]; 3];
-    for (position, slopes) in positions.iter().zip(point.gradients).skip(1) {
+    for (position, slopes) in positions.iter().zip(slopes).skip(1) {
         let edge = sub(*position, positions[0]);
         for (column, slope) in columns.iter_mut().zip(slopes) {
             *column = std::array::from_fn(|i| column[i] + slope * edge[i]);
@@ -32,7 +32,7 @@ pub(super) fn rest(info: &ElementInfo, positions: &[[f64; 3]]) -> Vec<RestPoint<
         return vec![RestPoint { inverse_jacobian: std::array::from_fn(|k| rows[k]), weight: shape.volume }];
     }
     let of = |point: &ReferencePoint| {
-        let [a, b, c] = jacobian(info, point, positions);
+        let [a, b, c] = jacobian(info, point.gradients, positions);
         let det = dot(a, cross(b, c));
         let rows = [cross(b, c), cross(c, a), cross(a, b)];
         let rows = rows.as_flattened();
@@ -41,12 +41,24 @@ pub(super) fn rest(info: &ElementInfo, positions: &[[f64; 3]]) -> Vec<RestPoint<
     info.points.iter().map(of).collect()
 }
 
+/// The volume that each point of a rule of masses stands for, with the slopes of the functions there.
+pub(crate) fn point_volumes<'a>(
+    info: &'a ElementInfo,
+    slopes: &'a [Vec<[f64; 3]>],
+    positions: &'a [[f64; 3]],
+) -> impl Iterator<Item = f64> + 'a {
+    info.mass_rule.iter().zip(slopes).map(|((_, weight), slopes)| {
+        let [a, b, c] = jacobian(info, slopes, positions);
+        dot(a, cross(b, c)) * weight
+    })
+}
+
 /// The integral of each node's function over a face (m2), or over an edge of a plane body (m, which is m2 of unit
 /// thickness).
 pub fn integrals(info: &ElementInfo, positions: &[[f64; 3]]) -> Vec<f64> {
     let mut integrals = vec![0.0; info.nodes];
     for point in info.points {
-        let [a, b, _] = jacobian(info, point, positions);
+        let [a, b, _] = jacobian(info, point.gradients, positions);
         let scale = if info.dimension == 2 { norm(cross(a, b)) } else { norm(a) };
         for (integral, function) in integrals.iter_mut().zip(point.functions) {
             *integral += function * scale * point.weight;

@@ -15,5 +15,6 @@ pub use error::{GroupKind, MeshError};
 pub use gradients::{ShapeGradients, shape_gradients};
 pub use incidence::Incidence;
 pub use map::integrals;
+pub(crate) use map::point_volumes;
 pub use quality::Quality;
 pub use topology::{Block, ElementId, FaceId, Groups, Mesh, NodeId, Orientation};

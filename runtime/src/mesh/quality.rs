@@ -55,7 +55,7 @@ impl Quality {
                 continue;
             }
             for point in info.points {
-                quality.parallelepiped(element, map::jacobian(info, point, &positions), info.dimension);
+                quality.parallelepiped(element, map::jacobian(info, point.gradients, &positions), info.dimension);
             }
         }
         quality

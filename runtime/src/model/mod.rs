@@ -11,7 +11,8 @@ pub(crate) mod place;
 
 use tensormass_kernels::{ElementEntry, RestPoint};
 
-use crate::body::{self, Body, Rows};
+use crate::body::{Body, Rows};
+use crate::mass::{self, MassMatrix};
 use crate::mesh::gmsh::{self, MeshFileError};
 use crate::mesh::{self, Mesh, Orientation, Quality};
 use crate::probe::Recorder;
@@ -80,9 +81,9 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
     let scale = Scale::new(diagonal, assignment.stiffness(), assignment.density());
     let elements: Rows<u32> = mesh.elements().map(|e| mesh.element_nodes(e).iter().map(|n| n.0)).collect();
     let rest = scaled_rest(&mesh, scale.length);
-    let densities = assignment.densities().map(|density| density / scale.density());
+    let densities: Vec<f64> = assignment.densities().map(|density| density / scale.density()).collect();
     let element_masses: Vec<f64> =
-        rest.iter().zip(densities).map(|(points, d)| points.iter().map(|p| p.weight).sum::<f64>() * d).collect();
+        rest.iter().zip(&densities).map(|(points, d)| points.iter().map(|p| p.weight).sum::<f64>() * d).collect();
     let batches = assignment.batches(&mesh, &scale);
     let (constraints, motions) = boundary::constraints(scene, &mesh, &places, &scale)?;
     // Plane bodies are held along z whatever a scene says.
@@ -96,12 +97,22 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
         .into());
     }
     let each = mesh.elements().zip(elements.iter()).zip(&element_masses);
-    let masses = body::lump(mesh.nodes().len(), each.map(|((e, nodes), mass)| (mesh.kind(e), nodes, *mass)));
+    let masses = mass::lump(mesh.nodes().len(), each.map(|((e, nodes), mass)| (mesh.kind(e), nodes, *mass)));
+    let mass_matrix = match (scene.solver.mass, scene.solver.integrator) {
+        (scene::Mass::Lumped, _) | (_, scene::Integrator::Static) => None,
+        (scene::Mass::Consistent, _) => {
+            let matrix = MassMatrix::assemble(&mesh, &densities, scale.length);
+            Some(matrix.ok_or_else(|| {
+                let reason = "the consistent mass has more entries than this program can count";
+                SceneError::at(scene.locate("solver.mass"), reason, "choose \"lumped\", or a coarser mesh")
+            })?)
+        }
+    };
     // In motion a body falls as a whole only where weight and inertia are the same masses; in equilibrium the integrals of
     // the functions are more accurate.
     let weights = match scene.solver.integrator {
         scene::Integrator::Static => loads::weights(&mesh, &elements, &rest, &element_masses),
-        _ => masses.clone(),
+        _ => mass_matrix.as_ref().map_or_else(|| masses.clone(), MassMatrix::row_sums),
     };
     let loads = loads::loads(scene, &mesh, &places, &scale, &weights)?;
     let recorder = Recorder::new(scene, &mesh, &places, &constraints)?;
@@ -111,6 +122,7 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
         rest,
         batches,
         masses,
+        mass_matrix,
         element_masses,
         constraints,
         motions,

@@ -3,7 +3,7 @@
 use super::document::{Document, Node};
 use super::error::{Location, SceneError};
 use super::model::{
-    Boundary, History, Integrator, Load, Mesh, Parameter, ParameterValue, PerElement, Ramp, SceneData, Solver,
+    Boundary, History, Integrator, Load, Mass, Mesh, Parameter, ParameterValue, PerElement, Ramp, SceneData, Solver,
 };
 use super::shape::written;
 
@@ -42,10 +42,7 @@ pub(super) fn check(data: &SceneData, document: &Document) -> Result<(), SceneEr
 /// What is said to no effect.
 pub(super) fn warnings(data: &SceneData, document: &Document) -> Vec<String> {
     let solver = &data.solver;
-    let explicit = match solver.integrator {
-        Integrator::SemiImplicitEuler | Integrator::CentralDifference => true,
-        Integrator::ImplicitEuler | Integrator::Static => false,
-    };
+    let explicit = is_explicit(solver.integrator);
     let still = solver.integrator == Integrator::Static;
     let given = |key: &str| document.root.child("solver").and_then(|solver| solver.child(key)).is_some();
     let mut warnings = Vec::new();
@@ -59,10 +56,20 @@ pub(super) fn warnings(data: &SceneData, document: &Document) -> Vec<String> {
             warnings.push(format!("solver.{key} has no effect: static equilibrium has no motion"));
         }
     }
+    if still && solver.mass != Mass::Lumped {
+        warnings.push("solver.mass has no effect: static equilibrium has no inertia".to_owned());
+    }
     if still && data.initial.velocity != [0.0; 3] {
         warnings.push("initial.velocity has no effect: static equilibrium has no motion".to_owned());
     }
     warnings
+}
+
+fn is_explicit(integrator: Integrator) -> bool {
+    match integrator {
+        Integrator::SemiImplicitEuler | Integrator::CentralDifference => true,
+        Integrator::ImplicitEuler | Integrator::Static => false,
+    }
 }
 
 struct Context<'d> {
@@ -205,6 +212,11 @@ impl Context<'_> {
             (_, _, None) => return missing("duration", "simulated time in s, above 0."),
             (_, None, Some(_)) => return missing("step", "time step in s, above 0."),
         };
+        if solver.mass == Mass::Consistent && is_explicit(solver.integrator) {
+            let reason = "explicit integrators divide by masses, and consistent ones are a matrix";
+            let remedy = "choose mass = \"lumped\", or integrator = \"implicit-euler\"";
+            return Err(SceneError::at(self.place("solver.mass"), reason, remedy));
+        }
         if step > duration {
             return Err(SceneError::at(
                 self.place("solver.step"),

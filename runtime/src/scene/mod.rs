@@ -24,8 +24,8 @@ mod suggest;
 
 pub use error::{Fault, Location, SceneError};
 pub use model::{
-    About, Axis, Beam, Boundary, ConjugateGradient, History, Initial, Integrator, Load, Material, Mesh, Motion, Newton,
-    Parameter, ParameterValue, PerElement, Precision, Preconditioner, Ramp, SceneData, Solver,
+    About, Axis, Beam, Boundary, ConjugateGradient, History, Initial, Integrator, Load, Mass, Material, Mesh, Motion,
+    Newton, Parameter, ParameterValue, PerElement, Precision, Preconditioner, Ramp, SceneData, Solver,
 };
 pub use output::{Component, EnergyPart, Field, Output, Probe, Statistic, StressComponent};
 pub use overrides::Override;

@@ -396,6 +396,17 @@ pub enum Precision {
     F64,
 }
 
+/// How inertia is spread over the nodes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Mass {
+    /// A mass at each node.
+    #[default]
+    Lumped,
+    /// The integrals of products of the interpolation functions, a sparse matrix: motion as accurate as the element.
+    Consistent,
+}
+
 /// How the equations of motion or of equilibrium are solved.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -415,6 +426,9 @@ pub struct Solver {
     /// The number type of state and kernels.
     #[serde(default)]
     pub precision: Precision,
+    /// How inertia is spread over the nodes; explicit integrators need `lumped`, `static` has no inertia.
+    #[serde(default)]
+    pub mass: Mass,
     /// Mass-proportional damping alpha in 1/s, from 0 to 1e9; `static` has none. With `stiffness_damping`, Rayleigh's
     /// C = alpha M + beta K.
     #[serde(default)]

@@ -6,12 +6,15 @@ use tensormass_runtime::backend::{Backend, Damping, ForceField, Operator, REGIST
 use tensormass_runtime::body::{Body, Constraint, LawBatch};
 use tensormass_runtime::gpu::{Gpu, GpuOptions};
 use tensormass_runtime::history::History;
+use tensormass_runtime::mass::{MassMatrix, Masses};
 use tensormass_runtime::mesh::{Mesh, beam};
 use tensormass_runtime::{LawEntry, laws};
 use tensormass_testing::random::Rng;
 
 use crate::meshes::{boxes_beside_wedges, distorted, unit};
-use crate::states::{Analysis, Bound, Kernel, Vector, batches, compare, of_mesh, other_elements, vectors};
+use crate::states::{
+    Analysis, Bound, Kernel, Vector, batches, compare, of_mesh, other_elements, representatives, single, vectors,
+};
 use crate::support::gpu::test_device;
 use crate::{On, on_cpu, on_gpu};
 
@@ -80,6 +83,18 @@ impl Shared {
         sums.iter().zip(old).map(|(sum, old)| sum.added(factor, *old, pages as f64)).collect()
     }
 
+    /// M x: three different masses a node, or the rows of the matrix, one term after the other.
+    fn masses_times(&self, x: &[Bound]) -> Vec<Bound> {
+        let Some(matrix) = &self.body.mass_matrix else {
+            let masses = self.body.masses.iter().flat_map(|&m| [m, 2.0 * m, 4.0 * m]).map(Bound::exact);
+            return masses.zip(x).map(|(m, &x)| m * x).collect();
+        };
+        let entry = |k: usize, c: usize| Bound::exact(matrix.values[k]) * x[3 * matrix.columns[k] as usize + c];
+        let component = |i: usize, c: usize| matrix.row(i).map(|k| entry(k, c)).reduce(|a, b| a + b);
+        let node = |i: usize| (0..3).map(move |c| component(i, c).expect("a node of an element"));
+        (0..matrix.len()).flat_map(node).collect()
+    }
+
     fn is_imposed(&self, k: usize) -> bool {
         self.body.constraints.iter().any(|c| 3 * c.node as usize + usize::from(c.component) == k)
     }
@@ -137,8 +152,13 @@ fn product<B: Backend, F: ForceField<B>>(
     damped: bool,
 ) -> (Vec<f64>, f64) {
     let On { backend, field } = on;
-    let masses: Vector = body.body.masses.iter().map(|&m| [m, 2.0 * m, 4.0 * m]).collect();
-    let (masses, x, mut y) = (backend.upload(&masses), backend.upload(&body.du), backend.upload(&body.old));
+    let (x, mut y) = (backend.upload(&body.du), backend.upload(&body.old));
+    let masses = match &body.body.mass_matrix {
+        Some(matrix) => Masses::consistent(backend, matrix),
+        None => {
+            Masses::lumped(backend.upload(&body.body.masses.iter().map(|&m| [m, 2.0 * m, 4.0 * m]).collect::<Vec<_>>()))
+        }
+    };
     let mut registers = [0.0; REGISTERS];
     registers[RUNNING] = running;
     let mut registers = backend.registers(registers);
@@ -182,9 +202,8 @@ fn check(gpu: &Arc<Gpu>, body: &Shared, options: GpuOptions, analysis: &Analysis
         println!("{what}: {:.3} of the bound", compare(&what, &found, &wanted, &bounds));
         all.push(found);
     }
-    let masses = body.body.masses.iter().flat_map(|&m| [m, 2.0 * m, 4.0 * m]).map(Bound::exact);
     let x: Vec<Bound> = body.du.iter().flatten().copied().map(Bound::exact).collect();
-    let first: Vec<Bound> = masses.zip(&x).map(|(m, &x)| Bound::exact(OPERATOR.0) * m * x).collect();
+    let first = body.masses_times(&x).into_iter().map(|m| Bound::exact(OPERATOR.0) * m).collect::<Vec<_>>();
     // Slots hold -K x.
     let undamped = body.sums(Kernel::DForce, -OPERATOR.1, analysis, pages, &first);
     for damped in [false, true] {
@@ -222,19 +241,18 @@ fn sums_at_nodes_are_those_of_f64_rounded() {
     }
 }
 
-/// Any element, and two kinds that share nodes; of laws that between them have all that a law can have.
+/// Any element, and two kinds that share nodes; of laws that between them have all that passes know of a law.
 #[test]
 fn sums_of_every_element_are_those_of_f64_rounded() {
     let Some(gpu) = test_device().map(Arc::new) else { return };
     let analysis = Analysis::new();
-    let some = |has: &dyn Fn(&LawEntry) -> bool| laws().iter().find(|law| has(law)).expect("a law of that kind");
-    let two = [some(&|law| law.info.domain.is_some()), some(&|law| law.damping.is_some())];
+    let laws = representatives();
     let mixed = distorted(&boxes_beside_wedges(3), 0.3, 17);
     for mesh in other_elements().map(|element| distorted(&unit(element, 3), 0.3, 5)).chain([mixed]) {
         let kinds: Vec<&str> = mesh.blocks().iter().map(|b| b.info().name).collect();
         println!("{}", kinds.join(" and "));
         // Nodes of quadratic elements are about 1/6 apart.
-        let body = Shared::of(&mesh, &two, 0.005, 5);
+        let body = Shared::of(&mesh, &laws, 0.005, 5);
         // A page has the slopes of its reference elements, too: room for those of one kind and half of all points.
         let table = |batch: &LawBatch| batch.element.info.points.len() * (batch.element.info.nodes - 1);
         let table = body.body.batches.iter().map(table).max().expect("a batch");
@@ -243,6 +261,26 @@ fn sums_of_every_element_are_those_of_f64_rounded() {
             check(&gpu, &body, GpuOptions { binding_bytes, ..GpuOptions::default() }, &analysis, least);
         }
     }
+}
+
+/// The same with the consistent mass, of two kinds that share nodes.
+#[test]
+fn products_with_the_consistent_mass_are_those_of_f64_rounded() {
+    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let body = with_matrix();
+    check(&gpu, &body, GpuOptions::default(), &Analysis::new(), 1);
+    let mut on = on_gpu(&gpu, &body.body, GpuOptions::default());
+    assert_eq!(product(&mut on, &body, 0.0, false).0, body.old.as_flattened(), "a solver that has stopped");
+}
+
+/// A body with a consistent mass of numbers of f32.
+fn with_matrix() -> Shared {
+    let mesh = distorted(&boxes_beside_wedges(3), 0.3, 17);
+    let mut shared = Shared::of(&mesh, &representatives(), 0.005, 5);
+    let mut matrix = MassMatrix::assemble(&mesh, &vec![1.0; mesh.len()], 1.0).expect("a small mesh");
+    matrix.values.iter_mut().for_each(|value| *value = single(*value));
+    shared.body.mass_matrix = Some(matrix);
+    shared
 }
 
 #[test]

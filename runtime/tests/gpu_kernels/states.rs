@@ -68,6 +68,7 @@ pub fn body(elements: Rows<u32>, rest: &Rows<RestPoint<f64>>, batches: Vec<LawBa
         rest: rest.iter().map(|r| r.iter().map(round).collect::<Vec<_>>()).collect(),
         batches,
         masses: (0..nodes).map(|_| single(rng.uniform(0.5, 2.0))).collect(),
+        mass_matrix: None,
         element_masses: vec![1.0; elements.len()],
         constraints: vec![],
         motions: vec![],

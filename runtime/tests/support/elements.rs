@@ -3,7 +3,7 @@
 
 use tensormass_kernels::{ElementEntry, ElementInfo, elements};
 use tensormass_runtime::mesh::{Block, Groups, Mesh, NodeId, beam_of};
-use tensormass_testing::codegen::element::{ElementDeclaration, Shape, declarations};
+use tensormass_testing::codegen::element::{ElementDeclaration, declarations};
 
 use crate::support::Random;
 
@@ -87,58 +87,4 @@ pub fn distorted(mesh: &Mesh, part: f64, seed: u64) -> Mesh {
 pub fn declaration(info: &ElementInfo) -> ElementDeclaration {
     let all = declarations().expect("the build has read them");
     all.into_iter().find(|e| e.name == info.name).expect("a declared element")
-}
-
-/// Nodes and weights of Gauss' rule on [0, 1], by Newton's method on Legendre's polynomial.
-fn gauss(n: usize) -> Vec<(f64, f64)> {
-    let legendre = |x: f64| {
-        let (mut p, mut q) = (1.0, x);
-        for k in 1..n {
-            let k = k as f64;
-            (p, q) = (q, ((2.0 * k + 1.0) * x * q - k * p) / (k + 1.0));
-        }
-        (q, n as f64 * (x * q - p) / (x * x - 1.0))
-    };
-    let of = |k: usize| {
-        let mut x = (std::f64::consts::PI * (k as f64 + 0.75) / (n as f64 + 0.5)).cos();
-        for _ in 0..50 {
-            let (value, slope) = legendre(x);
-            x -= value / slope;
-        }
-        let slope = legendre(x).1;
-        (0.5 * (1.0 + x), 1.0 / ((1.0 - x * x) * slope * slope))
-    };
-    (0..n).map(of).collect()
-}
-
-/// Points and weights of a rule of five points along each reference coordinate, whatever the element declares.
-pub fn fine_rule(shape: Shape) -> Vec<([f64; 3], f64)> {
-    let line = gauss(5);
-    let full = |t: f64, w: f64| (2.0 * t - 1.0, 2.0 * w);
-    let mut rule = vec![];
-    for &(r, wr) in &line {
-        for &(s, ws) in &line {
-            let plane = shape.dimension() == 2;
-            for &(t, wt) in if plane { &[(0.5, 0.5)][..] } else { &line } {
-                // Simplices by collapsed coordinates.
-                let triangle = ([r, s * (1.0 - r)], wr * ws * (1.0 - r));
-                let (third, wt2) = full(t, wt);
-                rule.push(match shape {
-                    Shape::Triangle => ([triangle.0[0], triangle.0[1], 0.0], triangle.1),
-                    Shape::Tetrahedron => {
-                        let [x, y] = triangle.0;
-                        let left = 1.0 - x - y;
-                        ([x, y, t * left], triangle.1 * wt * left)
-                    }
-                    Shape::Prism => ([triangle.0[0], triangle.0[1], third], triangle.1 * wt2),
-                    _ => {
-                        let ((x, wx), (y, wy)) = (full(r, wr), full(s, ws));
-                        let (z, wz) = if plane { (0.0, 1.0) } else { (third, wt2) };
-                        ([x, y, z], wx * wy * wz)
-                    }
-                });
-            }
-        }
-    }
-    rule
 }

@@ -18,7 +18,7 @@ use tensormass_runtime::scene::Preconditioner;
 use tensormass_runtime::system::Integrator;
 use tensormass_testing::codegen::element::Polynomial;
 
-use super::elements::{declaration, fine_rule, unit};
+use super::elements::{declaration, unit};
 use super::{body, parameters, system};
 
 /// Wave vectors and phases: no symmetry of the mesh.
@@ -103,7 +103,7 @@ pub struct Errors {
     pub energy: f64,
 }
 
-/// A function of the element and its slopes at the points of a rule that no element declares.
+/// The functions of an element and their slopes at the points of its rule for masses, which is finer than that of forces.
 struct Rule {
     points: Vec<(f64, Vec<f64>, Vec<[f64; 3]>)>,
 }
@@ -117,7 +117,7 @@ impl Rule {
             let functions = declared.functions.iter().map(|f| f.at_f64(&x)).collect();
             (weight, functions, slopes.iter().map(|s| s.each_ref().map(|p| p.at_f64(&x))).collect())
         };
-        Self { points: fine_rule(declared.shape).into_iter().map(point).collect() }
+        Self { points: element.info.mass_rule.iter().copied().map(point).collect() }
     }
 
     /// Calls at each point with its position, weight, functions and the gradients of the functions.

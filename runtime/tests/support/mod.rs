@@ -8,9 +8,10 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use tensormass_runtime::LawEntry;
-use tensormass_runtime::body::{Body, Constraint, LawBatch, Rows, lump};
+use tensormass_runtime::body::{Body, Constraint, LawBatch, Rows};
 use tensormass_runtime::cpu::{CpuBackend, CpuField, Precision};
 use tensormass_runtime::history::History;
+use tensormass_runtime::mass::lump;
 use tensormass_runtime::mesh::{ElementId, Mesh};
 use tensormass_runtime::scene::{self, Override, Scene};
 use tensormass_runtime::simulate::{Ending, Outcome, Silent, run};
@@ -240,6 +241,7 @@ pub fn body(mesh: &Mesh, law: &'static LawEntry, parameters: &[f64], imposed: &[
         rest: mesh.elements().map(|e| mesh.rest(e)).collect(),
         batches: kinds.map(batch).collect(),
         masses: lump(mesh.nodes().len(), each.map(|((e, nodes), mass)| (mesh.kind(e), nodes, *mass))),
+        mass_matrix: None,
         elements,
         element_masses,
         constraints: imposed.iter().enumerate().map(constraint).collect(),
