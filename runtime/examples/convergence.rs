@@ -1,6 +1,7 @@
 //! Errors of every element against the size of its mesh, as CSV: what docs/accuracy.md is made of.
 //!
-//! Manufactured solutions for a linear and a finite law, and the deflection of the cantilever CANTI_SMALL.
+//! Manufactured solutions for a linear and a finite law, the deflection of the cantilever CANTI_SMALL, and frequencies of a
+//! bar with consistent and with lumped masses, in the places of displacement and energy.
 
 #[path = "../tests/support/elements.rs"]
 mod elements;
@@ -8,11 +9,14 @@ mod elements;
 mod manufactured;
 #[path = "../tests/support/mod.rs"]
 mod support;
+#[path = "../tests/support/vibration.rs"]
+mod vibration;
 
 use elements::of_dimension;
 use manufactured::solve;
 use support::{CANTILEVER, body, done, parameters, probe, scene, system};
 use tensormass_runtime::laws;
+use vibration::{Frequency, frequency};
 
 fn main() {
     let linear = laws().iter().find(|l| l.info.structure.linear).expect("a linear law");
@@ -49,6 +53,13 @@ fn main() {
             let unknowns = outcome.summary["nodes"].as_u64().expect("a count") * 3;
             let tip = -probe(&outcome, "work");
             println!("cantilever,{},{},hooke,{across},{unknowns},{tip:e},0", element.info.name, element.info.order);
+        }
+    }
+    for element in of_dimension(3).chain(of_dimension(2)) {
+        for cells in [2, 4, 8] {
+            let Frequency { unknowns, consistent, lumped } = frequency(element, cells);
+            let (name, order) = (element.info.name, element.info.order);
+            println!("frequency,{name},{order},hooke,{cells},{unknowns},{:e},{:e}", consistent - 1.0, lumped - 1.0);
         }
     }
 }

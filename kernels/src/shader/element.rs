@@ -183,26 +183,28 @@ impl Composed<'_> {
         out + &entry_point(bindings.contains(&Binding::Gate))
     }
 
-    /// Where node j of an element stands in an array of four nodes an entry.
-    fn place(j: usize) -> String {
-        format!("[{}].{}", j / 4, ["x", "y", "z", "w"][j % 4])
+    /// Node j among vectors of four numbers under a name: `node1.x`.
+    fn place(name: &str, j: usize) -> String {
+        format!("{name}{}.{}", j / 4, ["x", "y", "z", "w"][j % 4])
     }
 
-    /// The type, and the value at element e, of an array of four nodes an entry.
-    fn by_fours(&self, buffer: &str) -> (String, String) {
-        let entries = self.info.nodes.div_ceil(4);
-        let kind = format!("array<vec4<u32>, {entries}>");
-        let values: Vec<String> = (0..entries).map(|k| format!("{buffer}[{}]", row(k))).collect();
-        (kind.clone(), format!("{kind}({})", values.join(", ")))
+    /// The vectors of four numbers of an element.
+    fn fours(&self, name: &'static str) -> impl Iterator<Item = (usize, String)> + use<> {
+        (0..self.info.nodes.div_ceil(4)).map(move |k| (k, format!("{name}{k}")))
+    }
+
+    /// Reads the nodes of an element, or their slots.
+    fn read_fours(&self, name: &'static str, buffer: &str, out: &mut Lines) {
+        self.fours(name).for_each(|(k, vector)| out.line(&format!("let {vector} = {buffer}[{}];", row(k))));
     }
 
     /// A function that reads the vectors of an element's nodes.
     fn gather(&self, name: &str, of: &str) -> String {
         let nodes = 0..self.info.nodes;
         let values: Vec<String> = nodes.clone().flat_map(|j| ["x", "y", "z"].map(|k| format!("u{j}.{k}"))).collect();
-        let (kind, _) = self.by_fours("nodes");
-        let mut out = Lines::new(&format!("fn {name}(node: {kind}) -> array<f32, {}> {{", values.len()));
-        nodes.for_each(|j| out.line(&format!("let u{j} = {of}[node{}];", Self::place(j))));
+        let arguments: Vec<String> = self.fours("node").map(|(_, vector)| format!("{vector}: vec4<u32>")).collect();
+        let mut out = Lines::new(&format!("fn {name}({}) -> array<f32, {}> {{", arguments.join(", "), values.len()));
+        nodes.for_each(|j| out.line(&format!("let u{j} = {of}[{}];", Self::place("node", j))));
         out.returns(&values)
     }
 
@@ -248,10 +250,11 @@ impl Composed<'_> {
     fn one_element(&self) -> String {
         let mut out = Lines::new("fn element(e: u32) {");
         if self.gathers() {
-            out.line(&format!("let node = {};", self.by_fours("nodes").1));
+            self.read_fours("node", "nodes", &mut out);
         }
+        let nodes = self.fours("node").map(|(_, vector)| vector).collect::<Vec<_>>().join(", ");
         for (name, reader, _) in self.gathered() {
-            out.line(&format!("let nodal_{name} = {reader}(node);"));
+            out.line(&format!("let nodal_{name} = {reader}({nodes});"));
         }
         if self.reads(Argument::Constants) {
             out.line("let first = constants_stride * e;");
@@ -364,11 +367,11 @@ impl Composed<'_> {
                 }
             }
             _ => {
-                out.line(&format!("let slot = {};", self.by_fours("slot_index").1));
+                self.read_fours("slot", "slot_index", out);
                 for j in 0..self.info.nodes {
                     let [x, y, z] = [3 * j, 3 * j + 1, 3 * j + 2];
-                    let place = Self::place(j);
-                    out.line(&format!("slots[slot{place}] = vec4<f32>(f[{x}], f[{y}], f[{z}], 0.0f);"));
+                    let place = Self::place("slot", j);
+                    out.line(&format!("slots[{place}] = vec4<f32>(f[{x}], f[{y}], f[{z}], 0.0f);"));
                 }
             }
         }
