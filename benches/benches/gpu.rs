@@ -10,16 +10,10 @@ use tensormass_benches::{beam, wave};
 use tensormass_runtime::backend::{Backend, ForceField};
 use tensormass_runtime::device::DeviceChoice;
 use tensormass_runtime::gpu::{Gpu, GpuBackend, GpuField, GpuOptions, open};
-use tensormass_runtime::model::{Model, build};
-use tensormass_runtime::scene::parse;
-use tensormass_runtime::{LawEntry, laws};
+use tensormass_runtime::laws;
+use tensormass_runtime::model::Model;
 
-const CELLS: [u32; 3] = [100, 22, 22];
-
-fn model(law: &LawEntry) -> Model {
-    let scene = parse(&beam(law.info, CELLS), "bench.toml", &[]).expect("the scene is right");
-    build(&scene).expect("the scene can be built")
-}
+const CELLS: [usize; 3] = [100, 22, 22];
 
 fn passes(group: &mut BenchmarkGroup<WallTime>, gpu: &Arc<Gpu>, model: &Model, options: GpuOptions, name: &str) {
     let backend = GpuBackend::new(Arc::clone(gpu), &model.body, options).expect("it fits");
@@ -51,11 +45,11 @@ fn all(c: &mut Criterion) {
     let mut group = c.benchmark_group(gpu.info().name.clone());
     for law in laws() {
         let name = format!("/{}", law.info.name);
-        passes(&mut group, &gpu, &model(law), GpuOptions::default(), &name);
+        passes(&mut group, &gpu, &beam(law, CELLS), GpuOptions::default(), &name);
     }
     // The law with the most operations a byte shows the two parameters best.
     let busiest = laws().iter().max_by_key(|l| l.info.operations.iter().map(|o| o.arithmetic()).sum::<u32>());
-    let model = model(busiest.expect("there is a law"));
+    let model = beam(busiest.expect("there is a law"), CELLS);
     for work_group_size in [32, 64, 128, 256] {
         let options = GpuOptions { work_group_size, ..GpuOptions::default() };
         passes(&mut group, &gpu, &model, options, &format!("/work group of {work_group_size}"));

@@ -9,13 +9,10 @@ use tensormass_benches::{beam, wave};
 use tensormass_runtime::backend::{Backend, ForceField};
 use tensormass_runtime::cpu::{CpuBackend, CpuField, Precision};
 use tensormass_runtime::laws;
-use tensormass_runtime::model::build;
-use tensormass_runtime::scene::parse;
 
 fn kernels<R: Precision>(c: &mut Criterion, precision: &str) {
     for law in laws() {
-        let scene = parse(&beam(law.info, [100, 10, 10]), "bench.toml", &[]).expect("the scene is right");
-        let model = build(&scene).expect("the scene can be built");
+        let model = beam(law, [100, 10, 10]);
         let nodes = model.mesh.nodes();
         let backend = CpuBackend::<R>::new(nodes.len(), vec![]);
         let mut field = CpuField::<R>::new(&model.body);

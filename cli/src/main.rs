@@ -1,5 +1,6 @@
 //! The `tensormass` command: reads the arguments, calls one subcommand, turns its outcome into an exit status.
 
+mod bench;
 mod devices;
 mod failure;
 mod law;
@@ -34,6 +35,8 @@ enum Command {
     Plan(plan::Arguments),
     /// Shows the GPUs of this machine, and which one `run --device auto` takes.
     Devices(devices::Arguments),
+    /// Measures how many elements a second this machine computes.
+    Bench(bench::Arguments),
     /// Constitutive laws: what this build has, and derivations of new ones.
     #[command(subcommand)]
     Law(law::Command),
@@ -45,6 +48,7 @@ impl Command {
             Command::Run(arguments) => run::call(&arguments),
             Command::Plan(arguments) => plan::call(&arguments),
             Command::Devices(arguments) => devices::call(&arguments),
+            Command::Bench(arguments) => bench::call(&arguments),
             Command::Law(command) => law::call(command),
         }
     }

@@ -140,6 +140,11 @@ pub trait Backend {
 
     /// What the backend runs on.
     fn name(&self) -> String;
+    /// Hands over all that was asked for, and waits until it is done.
+    ///
+    /// # Errors
+    /// The device has failed.
+    fn wait(&self) -> Result<(), DeviceError>;
     /// What the device was asked to do so far.
     fn counts(&self) -> Counts;
     /// Whether the device still works: numbers returned before a successful check are good.

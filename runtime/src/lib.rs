@@ -19,6 +19,7 @@ pub mod gpu;
 pub mod history;
 pub mod integrate;
 pub mod mass;
+pub mod measure;
 pub mod mesh;
 pub mod model;
 pub mod output;
@@ -31,4 +32,7 @@ pub mod step_limit;
 pub mod system;
 pub mod target;
 
-pub use tensormass_kernels::{Acceptance, LawEntry, LawInfo, Operations, ParameterInfo, Structure, law, laws};
+pub use tensormass_kernels::{
+    Acceptance, ElementEntry, LawEntry, LawInfo, Operations, ParameterInfo, Structure, element, elements, law, laws,
+    linear_tetrahedron,
+};

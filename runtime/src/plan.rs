@@ -209,11 +209,12 @@ impl Plan {
 }
 
 /// Operations of an element: those of its points, each with some gradients, its law, and what follows.
-fn operations(element: &ElementInfo, gradients: u32, then: u32) -> u32 {
+pub(crate) fn operations(element: &ElementInfo, gradients: u32, then: u32) -> u32 {
     element.points.len() as u32 * (gradients * element.gradient_operations + then)
 }
 
-fn point_operations(law: &LawInfo, kernel: &str) -> u32 {
+/// Operations of a law's kernel at a point; 0 where it has none of this name.
+pub(crate) fn point_operations(law: &LawInfo, kernel: &str) -> u32 {
     law.operations.iter().find(|o| o.kernel == kernel).map_or(0, |o| o.arithmetic())
 }
 

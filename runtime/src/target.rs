@@ -42,6 +42,15 @@ impl Target {
         if *choice == DeviceChoice::Auto { Ok(Self::Cpu) } else { Err(DeviceError::NoGpuSupport) }
     }
 
+    /// The device's name.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Cpu => "cpu".to_string(),
+            #[cfg(feature = "gpu")]
+            Self::Gpu(gpu, _) => gpu.info().name.clone(),
+        }
+    }
+
     /// What a user should know of the target before a run.
     pub fn warning(&self) -> Option<String> {
         match self {

@@ -5,7 +5,9 @@
 
 use super::Shader;
 use super::binding::{Binding, declarations};
+use super::frame::{OVERRIDES, STRIDE, entry_point};
 use super::functions::{Argument, ElementFunctions, PointFunction};
+use super::lines::{Lines, array, row};
 use crate::element::{ElementEntry, ElementInfo};
 use crate::law::LawEntry;
 
@@ -381,100 +383,10 @@ impl Composed<'_> {
     }
 }
 
-/// A function's text.
-struct Lines {
-    text: String,
-    depth: usize,
-}
-
-impl Lines {
-    fn new(head: &str) -> Self {
-        Self { text: format!("\n{head}\n"), depth: 1 }
-    }
-
-    /// A statement; the lines of a long one are set in as deep.
-    fn line(&mut self, text: &str) {
-        let indent = "    ".repeat(self.depth);
-        for line in text.lines() {
-            self.text += &format!("{indent}{line}\n");
-        }
-    }
-
-    fn open(&mut self, head: &str) {
-        self.line(head);
-        self.depth += 1;
-    }
-
-    fn close(&mut self) {
-        self.depth -= 1;
-        self.line("}");
-    }
-
-    /// The whole function, which returns an array.
-    fn returns(mut self, values: &[String]) -> String {
-        self.line(&format!("return {};", array(values)));
-        self.close();
-        self.text
-    }
-}
-
-/// The place of element e in block k of a buffer that has one entry an element in each block.
-fn row(k: usize) -> String {
-    match k {
-        0 => "e".to_string(),
-        1 => "element_pass.elements + e".to_string(),
-        _ => format!("{k}u * element_pass.elements + e"),
-    }
-}
-
-/// An array's constructor, three values a line.
-fn array(values: &[String]) -> String {
-    let lines: String = values.chunks(3).map(|line| format!("    {},\n", line.join(", "))).collect();
-    format!("array<f32, {}>(\n{lines})", values.len())
-}
-
 /// The function that reads the gradients of a linear tetrahedron.
 fn shape_gradients() -> String {
     let comment = "// grad Lambda_1, grad Lambda_2, ... of an element (1/m).";
     let mut out = Lines::new(&format!("{comment}\nfn shape_gradients(e: u32) -> array<f32, 9> {{"));
     (0..3).for_each(|k| out.line(&format!("let g{} = rest[{}];", k + 1, row(k))));
     out.returns(&(1..4).flat_map(|j| ["x", "y", "z"].map(|k| format!("g{j}.{k}"))).collect::<Vec<_>>())
-}
-
-const OVERRIDES: &str = "\
-override work_group_size: u32 = 64u;
-// Elements that one invocation computes, one after the other.
-override elements_per_invocation: u32 = 1u;
-";
-
-const STRIDE: &str = "\
-// Constants between one element's set and the next; 0 where all share one, which a compiler can then load once.
-override constants_stride: u32 = 0u;
-";
-
-fn entry_point(gated: bool) -> String {
-    let gate = if gated { "    if gate[0] == 0.0f {\n        return;\n    }\n" } else { "" };
-    format!(
-        "
-@compute @workgroup_size(work_group_size)
-fn main(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {{
-{gate}    let invocations = groups.x * groups.y * work_group_size;
-    let e = (group.y * groups.x + group.x) * work_group_size + local;
-    if e < element_pass.elements {{
-        element(e);
-    }}
-    // Not one loop for all: where an invocation has one element, nothing of a loop may be left.
-    for (var i = 1u; i < elements_per_invocation; i++) {{
-        let next = e + i * invocations;
-        if next < element_pass.elements {{
-            element(next);
-        }}
-    }}
-}}
-"
-    )
 }

@@ -7,7 +7,9 @@
 
 mod binding;
 mod element;
+mod frame;
 mod functions;
+mod lines;
 mod nodes;
 
 pub use binding::Binding;

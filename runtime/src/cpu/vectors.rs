@@ -239,6 +239,10 @@ impl<R: Precision> Backend for CpuBackend<R> {
         "cpu".to_string()
     }
 
+    fn wait(&self) -> Result<(), DeviceError> {
+        Ok(())
+    }
+
     fn counts(&self) -> Counts {
         Counts::default()
     }

@@ -171,15 +171,6 @@ impl GpuBackend {
         self.pending.set(groups[0] * groups[1]);
     }
 
-    /// Hands over what was recorded and waits until it is done.
-    ///
-    /// # Errors
-    /// The device has failed.
-    pub fn wait(&self) -> Result<(), DeviceError> {
-        self.recorder.submit();
-        self.recorder.gpu().wait()
-    }
-
     fn vector(&self) -> GpuVector {
         let kept = self.unused.borrow_mut().pop();
         // A vector as large as `origin`, which the device could bind.
@@ -427,6 +418,11 @@ impl Backend for GpuBackend {
 
     fn name(&self) -> String {
         self.recorder.gpu().info().name.clone()
+    }
+
+    fn wait(&self) -> Result<(), DeviceError> {
+        self.recorder.submit();
+        self.recorder.gpu().wait()
     }
 
     fn counts(&self) -> Counts {

@@ -1,0 +1,93 @@
+//! `tensormass bench`, called as a user calls it: what it measures and how it counts, never how fast a machine is.
+
+use std::process::Command;
+
+use serde_json::Value;
+
+/// Exit status, standard output and error output.
+fn call(arguments: &[&str]) -> (Option<i32>, String, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_tensormass")).arg("bench").args(arguments).output();
+    let output = output.expect("the binary starts");
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.code(), text(&output.stdout), text(&output.stderr))
+}
+
+fn json(arguments: &[&str]) -> Value {
+    let (status, out, err) = call(&[arguments, &["--json"]].concat());
+    assert_eq!(status, Some(0), "{err}");
+    serde_json::from_str(&out).unwrap_or_else(|e| panic!("{e}: {out}"))
+}
+
+const SMALL: [&str; 6] = ["--elements", "200", "--repeats", "3", "--device", "cpu"];
+const OPERATIONS: [&str; 6] = ["energy", "force", "dforce", "diagonal", "explicit step", "50 iterations of CG"];
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+#[test]
+fn every_operation_is_measured_and_counted() {
+    let precisions = ["--precision", "f32", "--precision", "f64"];
+    let laws = ["--law", "hooke", "--law", "st_venant_kirchhoff"];
+    let found = json(&[&SMALL[..], &precisions, &laws].concat());
+    assert!(number(&found["triad_bytes_per_s"]) > 0.0 && number(&found["threads"]) >= 1.0);
+    let measured = found["measured"].as_array().expect("a list");
+    assert_eq!(measured.len(), 4, "two laws in two precisions");
+    for one in measured {
+        let elements = number(&one["elements"]);
+        // 5 n^3 cells of six tetrahedra: n = 2.
+        assert_eq!((elements, number(&one["nodes"]), one["device"].as_str()), (240.0, 99.0, Some("cpu")));
+        let timings = one["timings"].as_array().expect("a list");
+        let names: Vec<_> = timings.iter().map(|t| t["operation"].as_str().expect("a name")).collect();
+        assert_eq!(names, OPERATIONS);
+        for timing in timings {
+            let seconds: Vec<f64> = timing["seconds"].as_array().expect("a list").iter().map(number).collect();
+            assert!(seconds.len() == 3 && seconds[0] > 0.0 && seconds.is_sorted(), "{timing}");
+            assert_eq!(number(&timing["median_s"]), seconds[1]);
+            let each = if timing["operation"] == OPERATIONS[5] { 50.0 } else { 1.0 };
+            assert!(
+                (number(&timing["elements_per_s"]) * seconds[1] / (each * elements) - 1.0).abs() < 1e-12,
+                "{timing}"
+            );
+        }
+        // docs/reproduction.md: operations of the paper's Force and DForce with Hooke's law.
+        if one["law"] == "hooke" {
+            assert_eq!([1, 2].map(|k| number(&timings[k]["flops_per_element"])), [129.0, 129.0]);
+        }
+        // Twice the bytes a number, but not a node's index: four of 4 bytes, and four of their slots.
+        let bytes = |k: usize| number(&timings[k]["bytes_per_element"]);
+        let real = if one["precision"] == "f64" { 8.0 } else { 4.0 };
+        let shared = 3.0 * real * 99.0 / 240.0;
+        assert!((bytes(1) - (32.0 + 10.0 * real + 24.0 * real + 3.0 * shared)).abs() < 1e-9, "{}", bytes(1));
+    }
+}
+
+#[test]
+fn elements_of_every_dimension() {
+    for (element, elements) in [("hexahedron_q1", 135.0), ("quadrangle_s2", 180.0), ("tetrahedron_p2", 240.0)] {
+        let found = json(&[&SMALL[..], &["--law", "hooke", "--element", element]].concat());
+        let one = &found["measured"][0];
+        assert_eq!((one["element"].as_str(), number(&one["elements"])), (Some(element), elements));
+    }
+    let (status, text, err) = call(&[&SMALL[..], &["--law", "hooke"]].concat());
+    assert_eq!((status, err.as_str()), (Some(0), ""));
+    for word in ["memory triad", "Melements/s", "of the triad", "hooke, 240 tetrahedron_p1, 99 nodes, f32, cpu"] {
+        assert!(text.contains(word), "no `{word}`: {text}");
+    }
+}
+
+#[test]
+fn what_cannot_be_measured_is_bad_input() {
+    let cases: [(&[&str], &str); 5] = [
+        (&["--law", "hoke"], "error: there is no law `hoke`; did you mean `hooke`?"),
+        (&["--element", "segment_p1"], "error: there is no element `segment_p1`"),
+        (&["--precision", "f16"], "precisions are f32 and f64"),
+        (&["--elements", "0"], "0 is not in 1..=50000000"),
+        (&["--device", "gpu", "--precision", "f64"], "a GPU computes in f32"),
+    ];
+    for (arguments, message) in cases {
+        let (status, out, err) = call(arguments);
+        assert_eq!((status, out.as_str()), (Some(2), ""), "{arguments:?}");
+        assert!(err.contains(message), "{arguments:?}: {err}");
+    }
+}
