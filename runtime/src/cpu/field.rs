@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use tensormass_kernels::RestPoint;
 
 use super::kernels::{Kernels, Part};
+use super::vectors::{BLOCK, exact_dot};
 use super::{CpuBackend, Precision};
 use crate::backend::{Backend, ForceField, LeftDomain, Operator, REGISTERS, RUNNING, SUM};
 use crate::body::{Body, LawBatch};
@@ -141,24 +142,55 @@ impl<R: Precision> CpuField<R> {
         debug_assert!(done.is_ok(), "differentials and damping report no domain");
     }
 
+    /// The sum of a node's slots.
+    fn sum_of_slots(&self, node: usize) -> [R; 3] {
+        let mut sum = [R::default(); 3];
+        for &slot in self.incidence.of(NodeId(node as u32)) {
+            let partial = self.slots[slot as usize];
+            for c in 0..3 {
+                sum[c] = sum[c] + partial[c];
+            }
+        }
+        sum
+    }
+
     /// Pass 2: y += factor times the sum of each node's slots.
     fn nodes(&self, factor: R, y: &mut [[R; 3]]) {
-        let slots = &self.slots;
         y.par_chunks_mut(CHUNK).enumerate().for_each(|(k, y)| {
             for (i, y) in y.iter_mut().enumerate() {
-                let node = k * CHUNK + i;
-                let mut sum = [R::default(); 3];
-                for &slot in self.incidence.of(NodeId(node as u32)) {
-                    let partial = slots[slot as usize];
-                    for c in 0..3 {
-                        sum[c] = sum[c] + partial[c];
-                    }
-                }
+                let sum = self.sum_of_slots(k * CHUNK + i);
                 for c in 0..3 {
                     y[c] = y[c] + factor * sum[c];
                 }
             }
         });
+    }
+
+    /// Pass 2 of a product: y = factor times the sum of each node's slots + mass M x, imposed components 0; x . y. One pass
+    /// over the vectors, with the arithmetic of [`Operator::apply`] and [`Backend::dot`].
+    fn product_at_nodes(
+        &self,
+        backend: &CpuBackend<R>,
+        [factor, mass]: [R; 2],
+        masses: &[[R; 3]],
+        x: &[[R; 3]],
+        y: &mut [[R; 3]],
+    ) -> f64 {
+        let blocks: Vec<f64> = y
+            .par_chunks_mut(BLOCK)
+            .enumerate()
+            .map(|(block, y)| {
+                let first = block * BLOCK;
+                let (x, masses) = (&x[first..][..y.len()], &masses[first..][..y.len()]);
+                for (i, y) in y.iter_mut().enumerate() {
+                    let sum = self.sum_of_slots(first + i);
+                    *y = std::array::from_fn(|c| factor * sum[c] + mass * (masses[i][c] * x[i][c]));
+                }
+                backend.imposed(block).for_each(|(i, c)| y[i][c] = R::default());
+                x.iter().zip(y.iter()).map(|(x, y)| exact_dot(x, y)).sum::<f64>()
+            })
+            .collect();
+        blocks.iter().sum()
     }
 }
 
@@ -260,9 +292,18 @@ impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
         y: &mut Vec<[R; 3]>,
         registers: &mut [f64; REGISTERS],
     ) {
-        if registers[RUNNING] > 0.0 {
+        if registers[RUNNING] == 0.0 {
+            return;
+        }
+        if operator.damping.is_some() || operator.masses.matrix().is_some() {
             operator.apply(backend, self, x, y);
             registers[SUM] = backend.dot(x, y);
+            return;
         }
+        let state = std::mem::take(&mut self.state);
+        self.everywhere(|kernels, part, out| kernels.dforce(part, &state, x, out));
+        self.state = state;
+        let factors = [-operator.stiffness, operator.mass].map(R::from_f64);
+        registers[SUM] = self.product_at_nodes(backend, factors, operator.masses.diagonal(), x, y);
     }
 }

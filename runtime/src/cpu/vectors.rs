@@ -9,7 +9,12 @@ use crate::device::DeviceError;
 use crate::mass::MassMatrix;
 
 /// Nodes a block: a block's partial sum is formed by one thread, blocks are added in order.
-const BLOCK: usize = 4096;
+pub(super) const BLOCK: usize = 1024;
+
+/// x . y of one node. The products of two f32 are exact in f64: a dot product's rounding does not limit a solver in f32.
+pub(super) fn exact_dot<R: Precision>(x: &[R; 3], y: &[R; 3]) -> f64 {
+    (0..3).map(|c| x[c].to_f64() * y[c].to_f64()).sum()
+}
 
 /// A mass matrix in memory, in compressed rows.
 #[derive(Debug)]
@@ -33,21 +38,20 @@ impl<R: Precision> CpuBackend<R> {
         Self { nodes, constraints, precision: std::marker::PhantomData }
     }
 
+    /// The imposed components of a block's nodes: the node's place in the block, and the component.
+    pub(super) fn imposed(&self, block: usize) -> impl Iterator<Item = (usize, usize)> {
+        let first = block * BLOCK;
+        let start = self.constraints.partition_point(|c| (c.node as usize) < first);
+        let here = self.constraints[start..].iter().take_while(move |c| (c.node as usize) < first + BLOCK);
+        here.map(move |c| (c.node as usize - first, c.component as usize))
+    }
+
     fn each(&self, x: &[[R; 3]], y: &mut [[R; 3]], f: impl Fn(&[R; 3], &mut [R; 3]) + Sync) {
         y.par_chunks_mut(BLOCK).zip(x.par_chunks(BLOCK)).for_each(|(y, x)| {
             for (y, x) in y.iter_mut().zip(x) {
                 f(x, y);
             }
         });
-    }
-
-    fn sum(x: &[[R; 3]], y: &[[R; 3]], f: impl Fn(&[R; 3], &[R; 3]) -> f64 + Sync) -> f64 {
-        let blocks: Vec<f64> = x
-            .par_chunks(BLOCK)
-            .zip(y.par_chunks(BLOCK))
-            .map(|(x, y)| x.iter().zip(y).map(|(x, y)| f(x, y)).sum::<f64>())
-            .collect();
-        blocks.iter().sum()
     }
 }
 
@@ -146,8 +150,9 @@ impl<R: Precision> Backend for CpuBackend<R> {
     }
 
     fn dot(&self, x: &Self::Vector, y: &Self::Vector) -> f64 {
-        // The products of two f32 are exact in f64: a dot product's rounding does not limit a solver in f32.
-        Self::sum(x, y, |x, y| (0..3).map(|c| x[c].to_f64() * y[c].to_f64()).sum())
+        let blocks = x.par_chunks(BLOCK).zip(y.par_chunks(BLOCK));
+        let block = |(x, y): (&[[R; 3]], &[[R; 3]])| x.iter().zip(y).map(|(x, y)| exact_dot(x, y)).sum::<f64>();
+        blocks.map(block).collect::<Vec<f64>>().iter().sum()
     }
 
     fn max_abs(&self, x: &Self::Vector) -> f64 {
@@ -218,10 +223,27 @@ impl<R: Precision> Backend for CpuBackend<R> {
     fn descend(&self, descent: Descent<Self>, registers: &mut Self::Registers) {
         if registers[RUNNING] > 0.0 {
             let Descent { d, q, preconditioner, x, r, z } = descent;
-            self.axpy(registers[ALPHA], d, x);
-            self.axpy(-registers[ALPHA], q, r);
-            self.divide(r, preconditioner, z);
-            registers[SUM] = self.dot(r, z);
+            let alpha = R::from_f64(registers[ALPHA]);
+            let minus = R::from_f64(-registers[ALPHA]);
+            let given = d.par_chunks(BLOCK).zip(q.par_chunks(BLOCK)).zip(preconditioner.par_chunks(BLOCK));
+            let changed = x.par_chunks_mut(BLOCK).zip(r.par_chunks_mut(BLOCK)).zip(z.par_chunks_mut(BLOCK));
+            // One pass over the vectors: each is read and written once.
+            let blocks: Vec<f64> = given
+                .zip(changed)
+                .map(|(((d, q), preconditioner), ((x, r), z))| {
+                    let mut sum = 0.0;
+                    for i in 0..x.len() {
+                        for c in 0..3 {
+                            x[i][c] = x[i][c] + alpha * d[i][c];
+                            r[i][c] = r[i][c] + minus * q[i][c];
+                            z[i][c] = r[i][c] / preconditioner[i][c];
+                        }
+                        sum += exact_dot(&r[i], &z[i]);
+                    }
+                    sum
+                })
+                .collect();
+            registers[SUM] = blocks.iter().sum();
         }
     }
 
