@@ -208,14 +208,13 @@ fn measure(target: &Target, subject: &Subject) -> Result<Measured, MeasureError>
     let cells = cells(subject.element, subject.elements);
     let text = scene_text(subject.law, subject.element.info, cells, subject.precision);
     let model = build(&scene::parse(&text, "bench.toml", &[])?)?;
-    let body = &model.body;
     match (target, subject.precision) {
         (Target::Cpu, scene::Precision::F32) => on_cpu::<f32>(subject, model),
         (Target::Cpu, scene::Precision::F64) => on_cpu::<f64>(subject, model),
         #[cfg(feature = "gpu")]
         (Target::Gpu(gpu, options), scene::Precision::F32) => {
-            let backend = GpuBackend::new(std::sync::Arc::clone(gpu), body, *options)?;
-            let field = GpuField::new(&backend, body)?;
+            let backend = GpuBackend::new(std::sync::Arc::clone(gpu), &model.body, *options)?;
+            let field = GpuField::new(&backend, &model.body)?;
             all(subject, model, backend, field, Layout { real: 4.0, vector: 16.0, point: 48.0 })
         }
         #[cfg(feature = "gpu")]
