@@ -8,7 +8,7 @@ use tensormass_runtime::gpu::{Gpu, GpuOptions};
 use tensormass_runtime::{LawEntry, laws};
 use tensormass_testing::random::Rng;
 
-use crate::states::{Analysis, Disjoint, KERNELS, Kernel, STRAIN, compare, other_elements, representatives};
+use crate::states::{Analysis, Disjoint, Kernel, PASSES, STRAIN, compare, other_elements, representatives};
 use crate::support::gpu::test_device;
 use crate::{on_cpu, on_gpu};
 
@@ -36,7 +36,7 @@ fn check(
 ) {
     let Disjoint { body, u, du, .. } = Disjoint::new(&[law], element, count, analysis, &mut Rng::new(1));
     let (mut cpu, mut gpu) = (on_cpu(&body), on_gpu(gpu, &body, GpuOptions::default()));
-    for kernel in KERNELS.into_iter().filter(|kernel| kernel.is_of(law)) {
+    for kernel in PASSES.into_iter().filter(|kernel| kernel.function(law).is_some()) {
         let (wanted, found) = (cpu.fresh(kernel, &u, &du), gpu.fresh(kernel, &u, &du));
         for batch in &body.batches {
             let materials = if batch.per_element { "a material each" } else { "one material" };

@@ -72,7 +72,7 @@ impl Shared {
     /// old + factor times the sum of each node's slots; bodies in `pages` add a sum a page.
     fn sums(&self, kernel: Kernel, factor: f64, analysis: &Analysis, pages: usize, old: &[Bound]) -> Vec<Bound> {
         let mut sums: Vec<Sum> = old.iter().map(|_| Sum::default()).collect();
-        for batch in self.body.batches.iter().filter(|batch| kernel.is_of(batch.law)) {
+        for batch in self.body.batches.iter().filter(|batch| kernel.function(batch.law).is_some()) {
             let values = analysis.batch(kernel, &self.body, batch, &self.u, &self.du);
             for (&e, slots) in batch.elements.iter().zip(values.chunks(3 * batch.element.info.nodes)) {
                 for (node, slot) in self.body.elements[e as usize].iter().zip(slots.chunks(3)) {

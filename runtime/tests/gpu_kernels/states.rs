@@ -5,7 +5,6 @@
 
 use std::collections::HashMap;
 
-use tensormass_kernels::shader::PASSES;
 use tensormass_kernels::{ElementEntry, GENERATED, RestPoint, elements};
 use tensormass_runtime::body::{Body, LawBatch, Rows};
 use tensormass_runtime::mesh::{Block, Groups, Mesh, NodeId};
@@ -16,6 +15,9 @@ use tensormass_testing::codegen::ir::{Input, Output, ValidKernel};
 use tensormass_testing::derivation;
 use tensormass_testing::random::Rng;
 use tensormass_testing::rounding::{Bounded, SINGLE, Wgsl};
+
+/// What is computed of an element; damping takes the increment as velocity, and its differential is in that direction.
+pub use tensormass_kernels::shader::{PASSES, Pass as Kernel};
 
 /// Bounds above this part of the values, on average, would prove nothing. Textbook energies lose half the digits of f32.
 const USEFUL: f64 = 1.0 / 64.0;
@@ -192,47 +194,6 @@ fn moved(g: &[f64; 9], nodes: &[[f64; 3]], plane: bool, rng: &mut Rng) -> Vector
     let at = |i: usize, x: &[f64; 3]| single(by[i] + (0..3).map(|k| g[3 * i + k] * x[k]).sum::<f64>());
     nodes.iter().map(|x| std::array::from_fn(|i| if plane && i == 2 { 0.0 } else { at(i, x) })).collect()
 }
-
-/// What a law's kernels compute of an element.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kernel {
-    /// Strain energy: 1 number.
-    Energy,
-    /// Forces at the nodes: 12 numbers.
-    Force,
-    /// Force differentials at the nodes: 12 numbers.
-    DForce,
-    /// The tangent's diagonal at the nodes: 12 numbers.
-    Diagonal,
-    /// Cauchy stress: 9 numbers.
-    Cauchy,
-    /// Damping forces at the nodes, the increment as velocity: 12 numbers.
-    Damping,
-    /// Their differentials at that velocity in its direction: 12 numbers.
-    DDamping,
-    /// Minus their diagonal at that velocity: 12 numbers.
-    DampingDiagonal,
-}
-
-impl Kernel {
-    /// Whether a law has it.
-    pub fn is_of(self, law: &LawEntry) -> bool {
-        let damps = matches!(self, Kernel::Damping | Kernel::DDamping | Kernel::DampingDiagonal);
-        law.damping.is_some() || !damps
-    }
-}
-
-/// Every kernel.
-pub const KERNELS: [Kernel; 8] = [
-    Kernel::Energy,
-    Kernel::Force,
-    Kernel::DForce,
-    Kernel::Diagonal,
-    Kernel::Cauchy,
-    Kernel::Damping,
-    Kernel::DDamping,
-    Kernel::DampingDiagonal,
-];
 
 /// The derivations of all laws and the kernels of all elements, to be interpreted.
 pub struct Analysis {
