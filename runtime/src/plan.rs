@@ -72,10 +72,7 @@ pub fn precision_name(precision: Precision) -> &'static str {
 impl Plan {
     /// The plan of a scene on a CPU or a GPU.
     pub fn new(scene: &Scene, model: &Model, layout: Layout) -> Self {
-        let implicit = match scene.solver.integrator {
-            Integrator::ImplicitEuler | Integrator::Static => true,
-            Integrator::SemiImplicitEuler | Integrator::CentralDifference => false,
-        };
+        let implicit = !scene.solver.integrator.is_explicit();
         let moves = scene.solver.integrator != Integrator::Static;
         // Static equilibrium has no damping.
         let viscous = moves && model.body.is_viscous();

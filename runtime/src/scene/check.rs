@@ -42,7 +42,7 @@ pub(super) fn check(data: &SceneData, document: &Document) -> Result<(), SceneEr
 /// What is said to no effect.
 pub(super) fn warnings(data: &SceneData, document: &Document) -> Vec<String> {
     let solver = &data.solver;
-    let explicit = is_explicit(solver.integrator);
+    let explicit = solver.integrator.is_explicit();
     let still = solver.integrator == Integrator::Static;
     let given = |key: &str| document.root.child("solver").and_then(|solver| solver.child(key)).is_some();
     let mut warnings = Vec::new();
@@ -63,13 +63,6 @@ pub(super) fn warnings(data: &SceneData, document: &Document) -> Vec<String> {
         warnings.push("initial.velocity has no effect: static equilibrium has no motion".to_owned());
     }
     warnings
-}
-
-fn is_explicit(integrator: Integrator) -> bool {
-    match integrator {
-        Integrator::SemiImplicitEuler | Integrator::CentralDifference => true,
-        Integrator::ImplicitEuler | Integrator::Static => false,
-    }
 }
 
 struct Context<'d> {
@@ -212,7 +205,7 @@ impl Context<'_> {
             (_, _, None) => return missing("duration", "simulated time in s, above 0."),
             (_, None, Some(_)) => return missing("step", "time step in s, above 0."),
         };
-        if solver.mass == Mass::Consistent && is_explicit(solver.integrator) {
+        if solver.mass == Mass::Consistent && solver.integrator.is_explicit() {
             let reason = "explicit integrators divide by masses, and consistent ones are a matrix";
             let remedy = "choose mass = \"lumped\", or integrator = \"implicit-euler\"";
             return Err(SceneError::at(self.place("solver.mass"), reason, remedy));

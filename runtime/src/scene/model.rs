@@ -385,6 +385,16 @@ pub enum Integrator {
     Static,
 }
 
+impl Integrator {
+    /// Whether steps take forces as they are, and solve for nothing.
+    pub fn is_explicit(self) -> bool {
+        match self {
+            Self::SemiImplicitEuler | Self::CentralDifference => true,
+            Self::ImplicitEuler | Self::Static => false,
+        }
+    }
+}
+
 /// The number type of state and kernels.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
