@@ -31,7 +31,7 @@ fn check(law: &LawEntry, state: &Value, context: &str) -> [f64; 4] {
     let nine = |key: &str| <[f64; 9]>::try_from(numbers(&state[key])).expect("nine components");
     let (g, d, expected) = (nine("G"), nine("dG"), [nine("P"), nine("dP")]);
     let (g32, d32) = (g.map(|x| x as f32), d.map(|x| x as f32));
-    let (single, double) = (Compiled::new((law.f32)(), &constants), Compiled::new((law.f64)(), &constants));
+    let (single, double) = (Compiled::<f32>::new(law, &constants), Compiled::<f64>::new(law, &constants));
     let wide = |x: [f32; 9]| x.map(f64::from);
     let found = [
         (wide(single.force(&g32).0), SINGLE),

@@ -3,7 +3,7 @@
 use tensormass_kernels::shader::{
     Argument, Binding, DampingFunctions, PASSES, Pass, PointFunction, Shader, element_pass, node_product, node_sum,
 };
-use tensormass_kernels::{DampingEntry, LawEntry, elements, laws};
+use tensormass_kernels::{elements, laws};
 use tensormass_testing::codegen::print::wgsl::is_free;
 use tensormass_testing::wgsl;
 
@@ -76,7 +76,9 @@ fn damping_that_reads_everything() {
         &[Argument::Constants, Argument::DisplacementGradient, Argument::GradientRate, Argument::GradientIncrement];
     let ddamping = PointFunction { name: "ddamping", text: text.leak(), arguments, field: None };
     let functions = Box::leak(Box::new(DampingFunctions { ddamping, ..*damping.functions }));
-    let law = LawEntry { damping: Some(DampingEntry { functions, ..damping }), ..*law };
+    let (mut law, mut with) = (*law, damping);
+    with.functions = functions;
+    law.damping = Some(with);
     for element in elements().iter().filter(|e| e.info.dimension > 1) {
         let shader = element_pass(&law, element, Pass::DDamping).expect("the law has a dissipation");
         check(&format!("damping that reads everything, {}", element.info.name), &shader);

@@ -1,9 +1,11 @@
 //! `tensormass bench`: how many elements a second kernels and steps compute on this machine.
 
+mod baseline;
+
 use clap::Args;
 use serde_json::{Value, json};
 use tensormass_runtime::device::DeviceChoice;
-use tensormass_runtime::measure::{Bench, MeasureError, Measured, Subject, Timing};
+use tensormass_runtime::measure::{self, Bench, MeasureError, Measured, Subject, Timing};
 use tensormass_runtime::plan::precision_name;
 use tensormass_runtime::scene::Precision;
 use tensormass_runtime::target::Target;
@@ -24,6 +26,9 @@ pub struct Arguments {
     /// Elements of the beam, about; other sizes if given again.
     #[arg(long, value_name = "COUNT", default_values_t = [60_000], value_parser = clap::value_parser!(u32).range(1..=50_000_000))]
     elements: Vec<u32>,
+    /// Cells of the beam along x, y and z instead, 20x10x10 say.
+    #[arg(long, value_name = "XxYxZ", value_parser = cells, conflicts_with = "elements")]
+    cells: Vec<[usize; 3]>,
     /// Numbers of state and kernels; the other if given again.
     #[arg(long, value_name = "f32|f64", default_values = ["f32"], value_parser = precision)]
     precision: Vec<Precision>,
@@ -36,9 +41,25 @@ pub struct Arguments {
     /// CPU threads; 0 takes all cores.
     #[arg(long, value_name = "COUNT", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=1024))]
     threads: u32,
+    /// A program to measure in turn, as often: it is called with the arguments of this call and --json, and has to print what
+    /// this program prints then. Another build of tensormass, say.
+    #[arg(long, value_name = "PROGRAM")]
+    baseline: Option<std::path::PathBuf>,
+    /// Rounds of this program and the baseline.
+    #[arg(long, value_name = "COUNT", default_value_t = 5, requires = "baseline", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    rounds: u32,
     /// Print the figures as JSON instead of text.
     #[arg(long)]
     json: bool,
+}
+
+fn cells(text: &str) -> Result<[usize; 3], String> {
+    let numbers: Option<Vec<usize>> =
+        text.split('x').map(|n| n.parse().ok().filter(|n| (1..=10_000).contains(n))).collect();
+    let cells = numbers.and_then(|n| <[usize; 3]>::try_from(n).ok());
+    cells.filter(|c| c.iter().product::<usize>() <= 10_000_000).ok_or_else(|| {
+        "cells are three numbers from 1 to 10000, ten million cells at most, such as 20x10x10".to_string()
+    })
 }
 
 fn precision(text: &str) -> Result<Precision, String> {
@@ -64,17 +85,23 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
             .ok_or_else(|| unknown("element", name, bodies().map(|e| e.info.name)))?,
     };
     let bench = Bench::new(arguments.threads as usize).map_err(failed)?;
+    let beams: Vec<[usize; 3]> = match arguments.cells.as_slice() {
+        [] => arguments.elements.iter().map(|&count| measure::cells(element, count as usize)).collect(),
+        given => given.to_vec(),
+    };
     let mut subjects = vec![];
     for &precision in &arguments.precision {
         let target = Target::open(&arguments.device, precision)
             .map_err(|e| Failure::bad_input(format!("--device {}: {e}", arguments.device)))?;
-        for &elements in &arguments.elements {
+        for &cells in &beams {
             for &law in &chosen {
                 let repeats = arguments.repeats as usize;
-                subjects
-                    .push((target.clone(), Subject { law, element, elements: elements as usize, precision, repeats }));
+                subjects.push((target.clone(), Subject { law, element, cells, precision, repeats }));
             }
         }
+    }
+    if let Some(program) = &arguments.baseline {
+        return baseline::compare(&bench, &subjects, program, arguments.rounds, arguments.json);
     }
     let bandwidth = bench.triad();
     if !arguments.json {

@@ -19,7 +19,8 @@ fn json(arguments: &[&str]) -> Value {
 }
 
 const SMALL: [&str; 6] = ["--elements", "200", "--repeats", "3", "--device", "cpu"];
-const OPERATIONS: [&str; 6] = ["energy", "force", "dforce", "diagonal", "explicit step", "50 iterations of CG"];
+const OPERATIONS: [&str; 8] =
+    ["energy", "force", "dforce", "linearize", "apply", "diagonal", "explicit step", "50 iterations of CG"];
 
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
@@ -44,21 +45,26 @@ fn every_operation_is_measured_and_counted() {
             let seconds: Vec<f64> = timing["seconds"].as_array().expect("a list").iter().map(number).collect();
             assert!(seconds.len() == 3 && seconds[0] > 0.0 && seconds.is_sorted(), "{timing}");
             assert_eq!(number(&timing["median_s"]), seconds[1]);
-            let each = if timing["operation"] == OPERATIONS[5] { 50.0 } else { 1.0 };
+            let each = if timing["operation"] == OPERATIONS[7] { 50.0 } else { 1.0 };
             assert!(
                 (number(&timing["elements_per_s"]) * seconds[1] / (each * elements) - 1.0).abs() < 1e-12,
                 "{timing}"
             );
         }
-        // docs/reproduction.md: operations of the paper's Force and DForce with Hooke's law.
+        // docs/reproduction.md: operations of the paper's Force and DForce with Hooke's law, of which nothing is stored.
+        let flops = |k: usize| number(&timings[k]["flops_per_element"]);
         if one["law"] == "hooke" {
-            assert_eq!([1, 2].map(|k| number(&timings[k]["flops_per_element"])), [129.0, 129.0]);
+            assert_eq!([1, 2, 3, 4].map(flops), [129.0, 129.0, 0.0, 129.0]);
+        } else {
+            assert!(flops(4) < flops(2), "what is stored is not computed again");
         }
-        // Twice the bytes a number, but not a node's index: four of 4 bytes, and four of their slots.
+        // An element has four places of 2 bytes; all are one cluster, whose nodes have a number, and a slot with a number.
         let bytes = |k: usize| number(&timings[k]["bytes_per_element"]);
         let real = if one["precision"] == "f64" { 8.0 } else { 4.0 };
-        let shared = 3.0 * real * 99.0 / 240.0;
-        assert!((bytes(1) - (32.0 + 10.0 * real + 24.0 * real + 3.0 * shared)).abs() < 1e-9, "{}", bytes(1));
+        let of_nodes = 99.0 / 240.0 * (4.0 + (2.0 * 4.0 * real + 4.0) + 3.0 * 3.0 * real);
+        assert!((bytes(1) - (8.0 + 10.0 * real + of_nodes)).abs() < 1e-9, "{}", bytes(1));
+        let stored = if one["law"] == "hooke" { 0.0 } else { 12.0 };
+        assert!((bytes(4) - bytes(1) - stored * real).abs() < 1e-9, "{}", bytes(4));
     }
 }
 
@@ -78,16 +84,39 @@ fn elements_of_every_dimension() {
 
 #[test]
 fn what_cannot_be_measured_is_bad_input() {
-    let cases: [(&[&str], &str); 5] = [
+    let cases: [(&[&str], &str); 9] = [
         (&["--law", "hoke"], "error: there is no law `hoke`; did you mean `hooke`?"),
         (&["--element", "segment_p1"], "error: there is no element `segment_p1`"),
         (&["--precision", "f16"], "precisions are f32 and f64"),
         (&["--elements", "0"], "0 is not in 1..=50000000"),
         (&["--device", "gpu", "--precision", "f64"], "a GPU computes in f32"),
+        (&["--cells", "20x10"], "cells are three numbers from 1 to 10000"),
+        (&["--baseline", "no-such-program", "--law", "hooke", "--elements", "30"], "it does not start"),
+        (&["--baseline", "false", "--law", "hooke", "--elements", "30"], "it ended with exit status: 1"),
+        (&["--baseline", "echo", "--law", "hooke", "--elements", "30"], "it has to print JSON"),
     ];
     for (arguments, message) in cases {
         let (status, out, err) = call(arguments);
         assert_eq!((status, out.as_str()), (Some(2), ""), "{arguments:?}");
         assert!(err.contains(message), "{arguments:?}: {err}");
     }
+}
+
+/// This program beside itself: it is called with the same arguments, and every operation of both is compared.
+#[test]
+fn a_baseline_is_measured_in_turn() {
+    let program = env!("CARGO_BIN_EXE_tensormass");
+    let subject = ["--law", "hooke", "--cells", "2x1x1", "--repeats", "1", "--device", "cpu"];
+    let found = json(&[&subject[..], &["--baseline", program, "--rounds", "3"]].concat());
+    let compared = found["compared"].as_array().expect("a list");
+    let operations: Vec<_> = compared.iter().map(|row| row["operation"].as_str().expect("a name")).collect();
+    assert_eq!((operations, &found["rounds"]), (OPERATIONS.to_vec(), &Value::from(3)));
+    for row in compared {
+        let ratios: Vec<f64> = row["ratios"].as_array().expect("a list").iter().map(number).collect();
+        assert!(ratios.len() == 3 && ratios[0] > 0.0 && ratios.is_sorted(), "{row}");
+        assert_eq!((&row["law"], &row["elements"]), (&Value::from("hooke"), &Value::from("12")));
+    }
+    let (status, text, err) = call(&[&subject[..], &["--baseline", program, "--rounds=1"]].concat());
+    assert_eq!((status, err.as_str()), (Some(0), ""));
+    assert!(text.starts_with("speed as a multiple of the other's: medians of 1 rounds in turn"), "{text}");
 }

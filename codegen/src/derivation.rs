@@ -1,6 +1,8 @@
 //! The derivation of one law: its kernels, validated, and the text form that `laws/derived/` commits.
 
-use crate::ir::{Input, InterpretError, InvalidKernel, IrTextError, KernelIr, Number, Output, ValidKernel, ValueId};
+use crate::ir::{
+    Cut, Input, InterpretError, InvalidKernel, IrTextError, KernelIr, Number, Output, ValidKernel, ValueId,
+};
 use crate::twofold::Twofold;
 
 /// The version of the derivation's text form.
@@ -83,6 +85,29 @@ impl PointKernel<'_> {
     }
 }
 
+/// What a number stored of a tangent costs, in additions: it is read from the outer caches or from memory for every
+/// increment (measured: docs/performance.md).
+const PRICE: u64 = 8;
+
+/// A law's tangent in two parts: what is computed once a state, and for every increment.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Tangent {
+    /// The minimum cut through the force differential.
+    Cut(Cut),
+    /// G is stored: the force differential has two forms, which choose by G.
+    Gradient,
+}
+
+impl Tangent {
+    /// Numbers stored at a point.
+    pub fn stored(&self) -> usize {
+        match self {
+            Tangent::Cut(cut) => cut.stored(),
+            Tangent::Gradient => 9,
+        }
+    }
+}
+
 /// Why a derivation's text is refused.
 #[derive(Debug, thiserror::Error)]
 pub enum DerivationError {
@@ -111,6 +136,15 @@ pub const KERNELS: [&str; 6] = ["material", "energy", "force", "dforce", "diagon
 pub const DAMPING_KERNELS: [&str; 4] = ["dissipation", "damping", "ddamping", "damping_diagonal"];
 
 impl Derivation {
+    /// The tangent in two parts.
+    pub fn tangent(&self) -> Tangent {
+        let dforce = self.point("dforce");
+        match dforce.far {
+            None => Tangent::Cut(dforce.near.cut(Input::GradientIncrement, PRICE)),
+            Some(_) => Tangent::Gradient,
+        }
+    }
+
     /// The kernel of this name.
     pub fn kernel(&self, name: &str) -> &ValidKernel {
         self.kernels

@@ -1,291 +1,299 @@
 //! Any law composed with any element: gather G at some quadrature points, evaluate the law there, contract.
 //!
-//! Laws and elements meet through function pointers, a block of points at a time, so that what is compiled is the sum of
-//! the two, not the product: a block's G and P stay in the innermost cache.
+//! Laws and elements meet through function pointers, some blocks at a time, so that what is compiled is the sum of the
+//! two, not the product: G and P stay in the innermost cache.
 
-use crate::damping::DampingEntry;
-use crate::element::{ElementInfo, ElementKernels, Elements, RestPoint, Table};
+use crate::blocks::{Blocks, States};
+use crate::element::{ElementEntry, ElementInfo, ElementKernels, Elements, Table};
+use crate::lanes::{Engine, Lanes, Node, Registers};
 use crate::law::LawEntry;
-use crate::point::{DampingPointKernels, Material, PointKernels, PointOutside};
-use crate::real::Real;
+use crate::point::{DampingPointKernels, Material, Outside, PointKernels};
+use crate::table::{Precision, Tabled};
 
-/// Quadrature points of a block, unless one element has more.
-const BLOCK: usize = 64;
+/// Numbers of a tensor at some points, at most, unless one block has more: what of G, dG and P stays in a cache.
+const NUMBERS: usize = 64 * 9;
 
-/// A precision in which laws and elements have entry points.
-pub trait Entry: Real {
-    /// A law's kernels.
-    fn point_kernels(law: &LawEntry) -> PointKernels<Self>;
-    /// A dissipative law's kernels.
-    fn damping_point_kernels(damping: &DampingEntry) -> DampingPointKernels<Self>;
-    /// An element's kernels.
-    fn element_kernels(element: &crate::ElementEntry) -> ElementKernels<Self>;
+/// A law on an element, in one precision: what it computes of the elements of a cluster, from and to vectors at its
+/// nodes.
+pub trait Compute<R>: Send + Sync {
+    /// Elements of a block.
+    fn lanes(&self) -> usize;
+    /// Displacements u -> each element's strain energy (unit of stress times m^3).
+    fn energy(&self, blocks: &Blocks<R>, u: &[Node<R>], out: &mut [R]) -> Outside;
+    /// Displacements u -> nodal forces f_j = - integral of P grad Lambda_j, added to f.
+    fn force(&self, blocks: &Blocks<R>, u: &[Node<R>], f: &mut [Node<R>]) -> Outside;
+    /// Displacements u and increments du -> the differentials of the nodal forces, added to df.
+    fn dforce(&self, blocks: &Blocks<R>, u: [&[Node<R>]; 2], df: &mut [Node<R>]);
+    /// Numbers stored of an element's state for [`Compute::apply`].
+    fn stored(&self) -> usize;
+    /// Room for the state of a cluster.
+    fn states(&self, blocks: &Blocks<R>) -> States<R>;
+    /// Displacements u -> what is stored for [`Compute::apply`].
+    fn linearize(&self, blocks: &Blocks<R>, u: &[Node<R>], states: &mut States<R>);
+    /// What was stored of u and increments du -> the differentials of [`Compute::dforce`], added to df.
+    fn apply(&self, blocks: &Blocks<R>, states: &States<R>, du: &[Node<R>], df: &mut [Node<R>]);
+    /// Displacements u -> the diagonal of the tangent stiffness -df/du, added to d.
+    fn diagonal(&self, blocks: &Blocks<R>, u: &[Node<R>], d: &mut [Node<R>]);
+    /// Displacements u -> each element's Cauchy stress, the mean over its volume at rest.
+    fn cauchy(&self, blocks: &Blocks<R>, u: &[Node<R>], out: &mut [[R; 9]]);
+    /// Displacements u and velocities v -> each element's dissipation potential; 0 where the law has none.
+    fn dissipation(&self, blocks: &Blocks<R>, u_v: [&[Node<R>]; 2], out: &mut [R]);
+    /// Displacements u and velocities v -> nodal damping forces, added to f; none where the law has no dissipation.
+    fn damping(&self, blocks: &Blocks<R>, u_v: [&[Node<R>]; 2], f: &mut [Node<R>]);
+    /// The differentials of [`Compute::damping`] where the velocities change by dv, added to df.
+    fn ddamping(&self, blocks: &Blocks<R>, u_v_dv: [&[Node<R>]; 3], df: &mut [Node<R>]);
+    /// The diagonal of minus that differential, added to d.
+    fn damping_diagonal(&self, blocks: &Blocks<R>, u_v: [&[Node<R>]; 2], d: &mut [Node<R>]);
 }
 
-impl Entry for f32 {
-    fn point_kernels(law: &LawEntry) -> PointKernels<f32> {
-        (law.point_f32)()
-    }
-    fn damping_point_kernels(damping: &DampingEntry) -> DampingPointKernels<f32> {
-        (damping.point_f32)()
-    }
-    fn element_kernels(element: &crate::ElementEntry) -> ElementKernels<f32> {
-        (element.f32)()
-    }
-}
-
-impl Entry for f64 {
-    fn point_kernels(law: &LawEntry) -> PointKernels<f64> {
-        (law.point_f64)()
-    }
-    fn damping_point_kernels(damping: &DampingEntry) -> DampingPointKernels<f64> {
-        (damping.point_f64)()
-    }
-    fn element_kernels(element: &crate::ElementEntry) -> ElementKernels<f64> {
-        (element.f64)()
+/// A law on an element.
+pub fn compose<R: Precision>(engine: Engine, element: &ElementEntry, law: &LawEntry) -> Box<dyn Compute<R>> {
+    match engine.registers() {
+        Registers::Scalar => Box::new(Composed::<R>::new(element, law)),
+        #[cfg(target_arch = "x86_64")]
+        Registers::Avx2(_) => Box::new(Composed::<R::Avx2>::new(element, law)),
+        #[cfg(target_arch = "x86_64")]
+        Registers::Avx512(_) => Box::new(Composed::<R::Avx512>::new(element, law)),
     }
 }
 
-/// A law on an element, in one precision.
-#[derive(Debug, Clone)]
-pub struct Composed<R: Real> {
+/// A law on an element, on some lanes.
+struct Composed<V: Lanes> {
     info: &'static ElementInfo,
-    element: ElementKernels<R>,
-    law: PointKernels<R>,
-    damping: Option<DampingPointKernels<R>>,
-    table: Table<R>,
+    element: ElementKernels<V>,
+    law: PointKernels<V>,
+    damping: Option<DampingPointKernels<V>>,
+    table: Table<V>,
+    /// Numbers stored of a point's state.
+    stored: usize,
 }
 
-/// Elements of one kind and law, and their material.
-#[derive(Debug, Clone, Copy)]
-pub struct ComposedBatch<'a, R> {
-    /// The nodes of one element after the other, into the displacement array.
-    pub nodes: &'a [u32],
-    /// The quadrature points of one element after the other.
-    pub rest: &'a [RestPoint<R>],
-    /// The law's constants: of the one material, or one set after the other, an element each.
-    pub constants: &'a [R],
-    /// Constants between one element's set and the next: 0 where all elements share one.
-    pub stride: usize,
-    /// How many constants a set has.
-    pub count: usize,
-}
-
-impl<R: Entry> Composed<R> {
-    /// A law on an element.
-    pub fn new(element: &crate::ElementEntry, law: &LawEntry) -> Self {
+impl<V: Tabled> Composed<V> {
+    fn new(element: &ElementEntry, law: &LawEntry) -> Self {
         Self {
             info: element.info,
-            element: R::element_kernels(element),
-            law: R::point_kernels(law),
-            damping: law.damping.as_ref().map(R::damping_point_kernels),
+            element: V::element(&element.kernels),
+            law: V::law(&law.kernels),
+            damping: law.damping.as_ref().map(|damping| V::damping(&damping.kernels)),
             table: Table::new(element.info),
+            stored: law.info.stored,
         }
     }
 
-    /// The element.
-    pub fn info(&self) -> &'static ElementInfo {
-        self.info
+    /// Numbers stored of a block's state.
+    fn of_block(&self) -> usize {
+        self.stored * self.info.points.len() * V::COUNT
     }
 
-    /// Displacements u -> each element's strain energy (unit of stress times m^3).
-    pub fn energy(&self, batch: &ComposedBatch<R>, u: &[[R; 3]], out: &mut [R]) -> PointOutside {
-        let mut densities = self.block(R::from_f64(0.0));
-        self.blocks(batch, out, 1, |block, out, g, _| {
-            (self.element.gradient)(&block.elements, u, g);
-            let densities = &mut densities[..g.len()];
-            let outside = (self.law.energy)(&block.material, g, densities);
-            self.integrate(&block, densities, out);
-            outside
-        })
+    /// Blocks that are computed at once.
+    fn group(&self) -> usize {
+        (NUMBERS / (9 * V::COUNT * self.info.points.len())).max(1)
     }
 
-    /// Displacements u -> each element's nodal forces f_j = - integral of P grad Lambda_j, one slot a node.
-    pub fn force(&self, batch: &ComposedBatch<R>, u: &[[R; 3]], out: &mut [[R; 3]]) -> PointOutside {
-        let mut stress = self.block([R::from_f64(0.0); 9]);
-        self.blocks(batch, out, self.info.nodes, |block, out, g, _| {
-            (self.element.gradient)(&block.elements, u, g);
-            let stress = &mut stress[..g.len()];
-            let outside = (self.law.force)(&block.material, g, stress);
-            (self.element.contract)(&block.elements, stress, out);
-            outside
-        })
+    /// Room for a tensor at each point of a group, and so many more.
+    fn tensors<const N: usize>(&self) -> [Vec<[V; 9]>; N] {
+        let points = self.group() * self.info.points.len();
+        std::array::from_fn(|_| vec![[V::from_f64(0.0); 9]; points])
     }
 
-    /// Displacements u and increments du -> each element's nodal force differentials, one slot a node.
-    pub fn dforce(&self, batch: &ComposedBatch<R>, u: &[[R; 3]], du: &[[R; 3]], out: &mut [[R; 3]]) {
-        let mut stress = self.block([R::from_f64(0.0); 9]);
-        self.blocks(batch, out, self.info.nodes, |block, out, g, dg| {
-            (self.element.gradient)(&block.elements, u, g);
-            (self.element.gradient)(&block.elements, du, dg);
-            let stress = &mut stress[..g.len()];
-            (self.law.dforce)(&block.material, g, dg, stress);
-            (self.element.contract)(&block.elements, stress, out);
-            None
-        });
-    }
-
-    /// Displacements u -> the diagonal of the tangent stiffness -df/du at each element's nodes.
-    pub fn diagonal(&self, batch: &ComposedBatch<R>, u: &[[R; 3]], out: &mut [[R; 3]]) {
-        let mut at_points = vec![[R::from_f64(0.0); 3]; self.block_points() * self.info.nodes];
-        self.blocks(batch, out, self.info.nodes, |block, out, g, _| {
-            (self.element.gradient)(&block.elements, u, g);
-            let at_points = &mut at_points[..g.len() * self.info.nodes];
-            (self.element.node_gradients)(&block.elements, at_points);
-            (self.law.diagonal)(&block.material, g, at_points);
-            self.integrate_nodes(&block, at_points, out);
-            None
-        });
-    }
-
-    /// Displacements u -> each element's Cauchy stress, the mean over its volume at rest.
-    pub fn cauchy(&self, batch: &ComposedBatch<R>, u: &[[R; 3]], out: &mut [[R; 9]]) {
-        let mut stress = self.block([R::from_f64(0.0); 9]);
-        self.blocks(batch, out, 1, |block, out, g, _| {
-            (self.element.gradient)(&block.elements, u, g);
-            let stress = &mut stress[..g.len()];
-            (self.law.cauchy)(&block.material, g, stress);
-            let points = self.info.points.len();
-            let all = stress.chunks_exact(points).zip(block.elements.rest.chunks_exact(points));
-            for ((stress, rest), out) in all.zip(out) {
-                let volume = rest[1..].iter().fold(rest[0].weight, |sum, r| sum + r.weight);
-                *out = std::array::from_fn(|k| {
-                    let sum = stress.iter().zip(rest).map(|(s, r)| s[k] * r.weight).reduce(|a, b| a + b);
-                    sum.expect("an element has a quadrature point") / volume
-                });
+    /// Calls for each group of blocks, with how many elements are before it.
+    fn groups(&self, blocks: &Blocks<V::Scalar>, mut call: impl FnMut(usize, Elements<V>, Material<V>)) {
+        let (group, count, points) = (self.group(), blocks.constants(), self.info.points.len());
+        let sets = if blocks.per_element() { group.min(blocks.len()) } else { 1 };
+        let mut constants = vec![V::from_f64(0.0); sets * count];
+        blocks.load_constants(0, &mut constants);
+        for first in (0..blocks.len()).step_by(group) {
+            let here = group.min(blocks.len() - first);
+            if blocks.per_element() && first > 0 {
+                blocks.load_constants(first, &mut constants[..here * count]);
             }
-            None
-        });
-    }
-
-    /// Displacements u and velocities v -> each element's dissipation potential; 0 where the law has none.
-    pub fn dissipation(&self, batch: &ComposedBatch<R>, [u, v]: [&[[R; 3]]; 2], out: &mut [R]) {
-        let Some(damping) = &self.damping else { return out.fill(R::from_f64(0.0)) };
-        let mut densities = self.block(R::from_f64(0.0));
-        self.blocks(batch, out, 1, |block, out, g, rate| {
-            (self.element.gradient)(&block.elements, u, g);
-            (self.element.gradient)(&block.elements, v, rate);
-            let densities = &mut densities[..g.len()];
-            (damping.dissipation)(&block.material, g, rate, densities);
-            self.integrate(&block, densities, out);
-            None
-        });
-    }
-
-    /// Displacements u and velocities v -> each element's nodal damping forces, one slot a node; 0 where the law has none.
-    pub fn damping(&self, batch: &ComposedBatch<R>, [u, v]: [&[[R; 3]]; 2], out: &mut [[R; 3]]) {
-        let Some(damping) = &self.damping else { return out.fill([R::from_f64(0.0); 3]) };
-        let mut stress = self.block([R::from_f64(0.0); 9]);
-        self.blocks(batch, out, self.info.nodes, |block, out, g, rate| {
-            (self.element.gradient)(&block.elements, u, g);
-            (self.element.gradient)(&block.elements, v, rate);
-            let stress = &mut stress[..g.len()];
-            (damping.damping)(&block.material, g, rate, stress);
-            (self.element.contract)(&block.elements, stress, out);
-            None
-        });
-    }
-
-    /// The differentials of [`Composed::damping`] where the velocities change by dv.
-    pub fn ddamping(&self, batch: &ComposedBatch<R>, [u, v, dv]: [&[[R; 3]]; 3], out: &mut [[R; 3]]) {
-        let Some(damping) = &self.damping else { return out.fill([R::from_f64(0.0); 3]) };
-        let mut stress = self.block([R::from_f64(0.0); 9]);
-        let mut increments = self.block([R::from_f64(0.0); 9]);
-        self.blocks(batch, out, self.info.nodes, |block, out, g, rate| {
-            (self.element.gradient)(&block.elements, u, g);
-            (self.element.gradient)(&block.elements, v, rate);
-            let (stress, dg) = (&mut stress[..g.len()], &mut increments[..g.len()]);
-            (self.element.gradient)(&block.elements, dv, dg);
-            (damping.ddamping)(&block.material, g, rate, dg, stress);
-            (self.element.contract)(&block.elements, stress, out);
-            None
-        });
-    }
-
-    /// The diagonal of minus that differential at each element's nodes.
-    pub fn damping_diagonal(&self, batch: &ComposedBatch<R>, [u, v]: [&[[R; 3]]; 2], out: &mut [[R; 3]]) {
-        let Some(damping) = &self.damping else { return out.fill([R::from_f64(0.0); 3]) };
-        let mut at_points = vec![[R::from_f64(0.0); 3]; self.block_points() * self.info.nodes];
-        self.blocks(batch, out, self.info.nodes, |block, out, g, rate| {
-            (self.element.gradient)(&block.elements, u, g);
-            (self.element.gradient)(&block.elements, v, rate);
-            let at_points = &mut at_points[..g.len() * self.info.nodes];
-            (self.element.node_gradients)(&block.elements, at_points);
-            (damping.diagonal)(&block.material, g, rate, at_points);
-            self.integrate_nodes(&block, at_points, out);
-            None
-        });
-    }
-
-    /// Elements of a block.
-    fn block_elements(&self) -> usize {
-        (BLOCK / self.info.points.len()).max(1)
-    }
-
-    fn block_points(&self) -> usize {
-        self.block_elements() * self.info.points.len()
-    }
-
-    /// A value for each point of a block.
-    fn block<T: Copy>(&self, zero: T) -> Vec<T> {
-        vec![zero; self.block_points()]
-    }
-
-    /// Calls for each block of elements, with their part of `out` (`each` entries an element) and room for two gradients a
-    /// point; the first element that is outside.
-    fn blocks<T>(
-        &self,
-        batch: &ComposedBatch<R>,
-        out: &mut [T],
-        each: usize,
-        mut call: impl FnMut(Block<R>, &mut [T], &mut [[R; 9]], &mut [[R; 9]]) -> PointOutside,
-    ) -> PointOutside {
-        let (nodes, points) = (self.info.nodes, self.info.points.len());
-        let size = self.block_elements();
-        let [mut g, mut dg] = [(); 2].map(|()| self.block([R::from_f64(0.0); 9]));
-        let mut outside = None;
-        for (k, out) in out.chunks_mut(size * each).enumerate() {
-            let (first, count) = (k * size, out.len() / each);
-            let elements = Elements {
-                nodes: &batch.nodes[first * nodes..][..count * nodes],
-                rest: &batch.rest[first * points..][..count * points],
-                table: &self.table,
-            };
-            let constants = &batch.constants[first * batch.stride..];
-            let material = Material { constants, stride: batch.stride, count: batch.count, points };
-            let here = call(Block { elements, material }, out, &mut g[..count * points], &mut dg[..count * points]);
-            outside = outside.or(here.map(|q| first + q / points));
+            let stride = if blocks.per_element() { count } else { 0 };
+            let material = Material { constants: &constants, stride, count, points };
+            call(first * V::COUNT, Elements { blocks, first, count: here, table: &self.table }, material);
         }
+    }
+
+    /// What a law makes of some gradients, contracted to the nodes.
+    fn contracted<const N: usize>(
+        &self,
+        blocks: &Blocks<V::Scalar>,
+        vectors: [&[Node<V::Scalar>]; N],
+        f: &mut [Node<V::Scalar>],
+        law: impl Fn(&Material<V>, [&[[V; 9]]; N], &mut [[V; 9]]) -> Outside,
+    ) -> Outside {
+        let mut gradients = self.tensors::<N>();
+        let [mut stress] = self.tensors::<1>();
+        let mut outside = None;
+        self.groups(blocks, |before, elements, material| {
+            let points = elements.count * material.points;
+            for (vector, gradient) in vectors.iter().zip(&mut gradients) {
+                (self.element.gradient)(&elements, vector, gradient);
+            }
+            let stress = &mut stress[..points];
+            let here = law(&material, gradients.each_ref().map(|g| &g[..points]), stress);
+            (self.element.contract)(&elements, stress, f);
+            outside = outside.or(here.map(|e| before + e));
+        });
         outside
     }
 
-    /// The integral over each element of a density at its points.
-    fn integrate(&self, block: &Block<R>, densities: &[R], out: &mut [R]) {
-        let points = self.info.points.len();
-        let all = densities.chunks_exact(points).zip(block.elements.rest.chunks_exact(points));
-        for ((densities, rest), out) in all.zip(out) {
-            let sum = densities.iter().zip(rest).map(|(w, r)| *w * r.weight).reduce(|a, b| a + b);
-            *out = sum.expect("an element has a quadrature point");
-        }
+    /// What a law makes of some gradients, and those of the nodes' functions, integrated at the nodes.
+    fn at_nodes<const N: usize>(
+        &self,
+        blocks: &Blocks<V::Scalar>,
+        vectors: [&[Node<V::Scalar>]; N],
+        d: &mut [Node<V::Scalar>],
+        law: impl Fn(&Material<V>, [&[[V; 9]]; N], &mut [[V; 3]]),
+    ) {
+        let mut gradients = self.tensors::<N>();
+        let mut at_points = vec![[V::from_f64(0.0); 3]; self.group() * self.info.points.len() * self.info.nodes];
+        self.groups(blocks, |_, elements, material| {
+            let points = elements.count * material.points;
+            for (vector, gradient) in vectors.iter().zip(&mut gradients) {
+                (self.element.gradient)(&elements, vector, gradient);
+            }
+            let at_points = &mut at_points[..points * self.info.nodes];
+            (self.element.node_gradients)(&elements, at_points);
+            law(&material, gradients.each_ref().map(|g| &g[..points]), at_points);
+            (self.element.integrate_nodes)(&elements, at_points, d);
+        });
     }
 
-    /// The integral over each element of what each of its nodes has at the points.
-    fn integrate_nodes(&self, block: &Block<R>, at_points: &[[R; 3]], out: &mut [[R; 3]]) {
-        let (nodes, points) = (self.info.nodes, self.info.points.len());
-        let all = at_points.chunks_exact(nodes * points).zip(block.elements.rest.chunks_exact(points));
-        for ((at_points, rest), out) in all.zip(out.chunks_exact_mut(nodes)) {
-            out.fill([R::from_f64(0.0); 3]);
-            for (values, rest) in at_points.chunks_exact(nodes).zip(rest) {
-                for (out, value) in out.iter_mut().zip(values) {
-                    *out = std::array::from_fn(|i| out[i] + value[i] * rest.weight);
-                }
+    /// The integral over each element of what a law makes of some gradients.
+    fn integrated<const N: usize>(
+        &self,
+        blocks: &Blocks<V::Scalar>,
+        vectors: [&[Node<V::Scalar>]; N],
+        out: &mut [V::Scalar],
+        law: impl Fn(&Material<V>, [&[[V; 9]]; N], &mut [V]) -> Outside,
+    ) -> Outside {
+        let mut gradients = self.tensors::<N>();
+        let mut densities = vec![V::from_f64(0.0); self.group() * self.info.points.len()];
+        let mut integrals = vec![V::from_f64(0.0); self.group()];
+        let mut outside = None;
+        self.groups(blocks, |before, elements, material| {
+            let points = elements.count * material.points;
+            for (vector, gradient) in vectors.iter().zip(&mut gradients) {
+                (self.element.gradient)(&elements, vector, gradient);
             }
-        }
+            let here = law(&material, gradients.each_ref().map(|g| &g[..points]), &mut densities[..points]);
+            (self.element.integrate)(&elements, &densities, &mut integrals);
+            outside = outside.or(here.map(|e| before + e));
+            let mut all = vec![V::Scalar::default(); V::COUNT];
+            for (out, integral) in out[before..].chunks_mut(V::COUNT).zip(&integrals[..elements.count]) {
+                integral.store(&mut all);
+                out.copy_from_slice(&all[..out.len()]);
+            }
+        });
+        outside
     }
 }
 
-/// Some elements, and their material.
-struct Block<'a, R> {
-    elements: Elements<'a, R>,
-    material: Material<'a, R>,
+impl<V: Tabled> Compute<V::Scalar> for Composed<V> {
+    fn lanes(&self) -> usize {
+        V::COUNT
+    }
+
+    fn energy(&self, blocks: &Blocks<V::Scalar>, u: &[Node<V::Scalar>], out: &mut [V::Scalar]) -> Outside {
+        self.integrated(blocks, [u], out, |material, [g], out| (self.law.energy)(material, g, out))
+    }
+
+    fn force(&self, blocks: &Blocks<V::Scalar>, u: &[Node<V::Scalar>], f: &mut [Node<V::Scalar>]) -> Outside {
+        self.contracted(blocks, [u], f, |material, [g], out| (self.law.force)(material, g, out))
+    }
+
+    fn dforce(&self, blocks: &Blocks<V::Scalar>, u_du: [&[Node<V::Scalar>]; 2], df: &mut [Node<V::Scalar>]) {
+        self.contracted(blocks, u_du, df, |material, [g, dg], out| {
+            (self.law.dforce)(material, g, dg, out);
+            None
+        });
+    }
+
+    fn stored(&self) -> usize {
+        self.stored * self.info.points.len()
+    }
+
+    fn states(&self, blocks: &Blocks<V::Scalar>) -> States<V::Scalar> {
+        States::new(blocks, self.stored)
+    }
+
+    fn linearize(&self, blocks: &Blocks<V::Scalar>, u: &[Node<V::Scalar>], states: &mut States<V::Scalar>) {
+        if self.stored == 0 {
+            return;
+        }
+        let [mut g] = self.tensors();
+        self.groups(blocks, |before, elements, material| {
+            let points = elements.count * material.points;
+            (self.element.gradient)(&elements, u, &mut g);
+            let states = states.of_mut(before / V::COUNT, elements.count, self.of_block());
+            (self.law.linearize)(&material, &g[..points], states);
+        });
+    }
+
+    fn apply(
+        &self,
+        blocks: &Blocks<V::Scalar>,
+        states: &States<V::Scalar>,
+        du: &[Node<V::Scalar>],
+        df: &mut [Node<V::Scalar>],
+    ) {
+        let [mut dg, mut stress] = self.tensors();
+        self.groups(blocks, |before, elements, material| {
+            let points = elements.count * material.points;
+            (self.element.gradient)(&elements, du, &mut dg);
+            let states = states.of(before / V::COUNT, elements.count, self.of_block());
+            (self.law.apply)(&material, states, &dg[..points], &mut stress[..points]);
+            (self.element.contract)(&elements, &stress, df);
+        });
+    }
+
+    fn diagonal(&self, blocks: &Blocks<V::Scalar>, u: &[Node<V::Scalar>], d: &mut [Node<V::Scalar>]) {
+        self.at_nodes(blocks, [u], d, |material, [g], out| (self.law.diagonal)(material, g, out));
+    }
+
+    fn cauchy(&self, blocks: &Blocks<V::Scalar>, u: &[Node<V::Scalar>], out: &mut [[V::Scalar; 9]]) {
+        let [mut g, mut stress, mut means] = self.tensors();
+        self.groups(blocks, |before, elements, material| {
+            let points = elements.count * material.points;
+            (self.element.gradient)(&elements, u, &mut g);
+            (self.law.cauchy)(&material, &g[..points], &mut stress[..points]);
+            (self.element.mean)(&elements, &stress, &mut means);
+            let mut all = vec![V::Scalar::default(); V::COUNT];
+            for (out, mean) in out[before..].chunks_mut(V::COUNT).zip(&means[..elements.count]) {
+                for (k, mean) in mean.iter().enumerate() {
+                    mean.store(&mut all);
+                    out.iter_mut().zip(&all).for_each(|(out, value)| out[k] = *value);
+                }
+            }
+        });
+    }
+
+    fn dissipation(&self, blocks: &Blocks<V::Scalar>, u_v: [&[Node<V::Scalar>]; 2], out: &mut [V::Scalar]) {
+        let Some(damping) = &self.damping else { return out.fill(V::Scalar::default()) };
+        self.integrated(blocks, u_v, out, |material, [g, rate], out| {
+            (damping.dissipation)(material, g, rate, out);
+            None
+        });
+    }
+
+    fn damping(&self, blocks: &Blocks<V::Scalar>, u_v: [&[Node<V::Scalar>]; 2], f: &mut [Node<V::Scalar>]) {
+        let Some(damping) = &self.damping else { return };
+        self.contracted(blocks, u_v, f, |material, [g, rate], out| {
+            (damping.damping)(material, g, rate, out);
+            None
+        });
+    }
+
+    fn ddamping(&self, blocks: &Blocks<V::Scalar>, u_v_dv: [&[Node<V::Scalar>]; 3], df: &mut [Node<V::Scalar>]) {
+        let Some(damping) = &self.damping else { return };
+        self.contracted(blocks, u_v_dv, df, |material, [g, rate, dg], out| {
+            (damping.ddamping)(material, g, rate, dg, out);
+            None
+        });
+    }
+
+    fn damping_diagonal(&self, blocks: &Blocks<V::Scalar>, u_v: [&[Node<V::Scalar>]; 2], d: &mut [Node<V::Scalar>]) {
+        let Some(damping) = &self.damping else { return };
+        self.at_nodes(blocks, u_v, d, |material, [g, rate], out| (damping.diagonal)(material, g, rate, out));
+    }
 }

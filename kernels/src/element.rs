@@ -4,8 +4,11 @@
 //! grad Lambda_j = J^-T dLambda_j/dxi: the slopes dLambda_j/dxi are a table of the element, J^-1 and the weight are data
 //! of the point.
 
+use crate::blocks::Blocks;
+use crate::lanes::{Lanes, Node};
 use crate::real::Real;
 use crate::shader::ElementFunctions;
+use crate::table::ElementTable;
 
 /// An element, as its file declares it.
 #[derive(Debug, Clone, PartialEq)]
@@ -137,64 +140,71 @@ pub trait Element: Send + Sync + 'static {
     fn node_gradients<R: Real>(slopes: &[R], inverse_jacobian: &[R; 9]) -> Self::Nodal<R>;
 }
 
-/// An element's slopes in one precision: point by point those of each node but the first, as many as the element has
+/// An element's slopes on some lanes: point by point those of each node but the first, as many as the element has
 /// dimensions.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Table<R> {
-    slopes: Vec<R>,
+pub struct Table<V> {
+    slopes: Vec<V>,
     points: usize,
 }
 
-impl<R: Real> Table<R> {
+impl<V: Real> Table<V> {
     /// The table of an element.
     pub fn new(info: &ElementInfo) -> Self {
         let of = |point: &ReferencePoint| {
             let nodes = point.gradients[1..].to_vec();
             nodes.into_iter().flat_map(|g| g.into_iter().take(info.dimension))
         };
-        Self { slopes: info.points.iter().flat_map(of).map(R::from_f64).collect(), points: info.points.len() }
+        Self { slopes: info.points.iter().flat_map(of).map(V::from_f64).collect(), points: info.points.len() }
     }
 
-    fn point(&self, q: usize) -> &[R] {
+    #[inline(always)]
+    fn point(&self, q: usize) -> &[V] {
         let len = self.slopes.len() / self.points;
         &self.slopes[q * len..][..len]
     }
 }
 
-/// Elements of one kind.
+/// Elements of one kind: a range of blocks.
 #[derive(Debug, Clone, Copy)]
-pub struct Elements<'a, R> {
-    /// The nodes of one element after the other, into the displacement array.
-    pub nodes: &'a [u32],
-    /// The quadrature points of one element after the other.
-    pub rest: &'a [RestPoint<R>],
+pub struct Elements<'a, V: Lanes> {
+    /// The blocks that the range is of.
+    pub(crate) blocks: &'a Blocks<V::Scalar>,
+    /// The first block.
+    pub(crate) first: usize,
+    /// How many blocks.
+    pub(crate) count: usize,
     /// The element's table.
-    pub table: &'a Table<R>,
+    pub(crate) table: &'a Table<V>,
 }
 
 /// Nodal vectors -> their gradients at each quadrature point.
-pub type GradientKernel<R> = fn(&Elements<R>, &[[R; 3]], &mut [[R; 9]]);
-/// A stress at each quadrature point -> nodal forces, one slot a node.
-pub type ContractKernel<R> = fn(&Elements<R>, &[[R; 9]], &mut [[R; 3]]);
+pub(crate) type GradientKernel<V> = fn(&Elements<V>, &[Node<<V as Lanes>::Scalar>], &mut [[V; 9]]);
+/// A stress at each quadrature point -> nodal forces, added to the nodes.
+pub(crate) type ContractKernel<V> = fn(&Elements<V>, &[[V; 9]], &mut [Node<<V as Lanes>::Scalar>]);
 /// The gradient of each node's function at each quadrature point.
-pub type NodeGradientKernel<R> = fn(&Elements<R>, &mut [[R; 3]]);
+pub(crate) type NodeGradientKernel<V> = fn(&Elements<V>, &mut [[V; 3]]);
 
-/// An element's kernels over a range of elements, in one precision.
+/// Values that each node has at the quadrature points -> their integrals over the elements, added to the nodes.
+pub(crate) type NodeIntegralKernel<V> = fn(&Elements<V>, &[[V; 3]], &mut [Node<<V as Lanes>::Scalar>]);
+/// A tensor at each quadrature point -> its mean over each element's volume.
+pub(crate) type MeanKernel<V> = fn(&Elements<V>, &[[V; 9]], &mut [[V; 9]]);
+
+/// An element's kernels over a range of blocks, on some lanes.
 #[derive(Debug, Clone, Copy)]
-pub struct ElementKernels<R> {
+pub struct ElementKernels<V: Lanes> {
     /// G at each quadrature point.
-    pub gradient: GradientKernel<R>,
+    pub(crate) gradient: GradientKernel<V>,
     /// Nodal forces.
-    pub contract: ContractKernel<R>,
+    pub(crate) contract: ContractKernel<V>,
     /// Gradients of the functions.
-    pub node_gradients: NodeGradientKernel<R>,
-}
-
-impl<R: Real> ElementKernels<R> {
-    /// The kernels of an element.
-    pub fn of<E: Element>() -> Self {
-        Self { gradient: gradient::<E, R>, contract: contract::<E, R>, node_gradients: node_gradients::<E, R> }
-    }
+    pub(crate) node_gradients: NodeGradientKernel<V>,
+    /// The integral over each element of what each of its nodes has at the points, added to the nodes.
+    pub(crate) integrate_nodes: NodeIntegralKernel<V>,
+    /// The integral over each element of a density.
+    pub(crate) integrate: fn(&Elements<V>, &[V], &mut [V]),
+    /// The mean over each element's volume of a tensor.
+    pub(crate) mean: MeanKernel<V>,
 }
 
 /// An element of this build.
@@ -202,10 +212,8 @@ impl<R: Real> ElementKernels<R> {
 pub struct ElementEntry {
     /// What it is.
     pub info: &'static ElementInfo,
-    /// Its kernels in single precision.
-    pub f32: fn() -> ElementKernels<f32>,
-    /// Its kernels in double precision.
-    pub f64: fn() -> ElementKernels<f64>,
+    /// Its kernels on all lanes.
+    pub(crate) kernels: ElementTable,
     /// Its kernels as WGSL, in single precision.
     pub functions: &'static ElementFunctions,
 }
@@ -213,51 +221,107 @@ pub struct ElementEntry {
 impl ElementEntry {
     /// The entry of an element.
     pub const fn new<E: Element>(info: &'static ElementInfo, functions: &'static ElementFunctions) -> Self {
-        Self { info, f32: ElementKernels::<f32>::of::<E>, f64: ElementKernels::<f64>::of::<E>, functions }
+        Self { info, kernels: ElementTable::of::<E>(), functions }
     }
 }
 
 /// See [`GradientKernel`].
-fn gradient<E: Element, R: Real>(elements: &Elements<R>, u: &[[R; 3]], out: &mut [[R; 9]]) {
-    let info = E::info();
-    let points = info.points.len();
-    for ((nodes, rest), out) in elements
-        .nodes
-        .chunks_exact(info.nodes)
-        .zip(elements.rest.chunks_exact(points))
-        .zip(out.chunks_exact_mut(points))
-    {
+#[inline(always)]
+pub(crate) fn gradient<E: Element, V: Lanes>(elements: &Elements<V>, u: &[Node<V::Scalar>], out: &mut [[V; 9]]) {
+    let points = E::info().points.len();
+    let Elements { blocks, first, count, table } = *elements;
+    for block in 0..count {
         let mut nodal = E::nodal();
-        for (to, n) in nodal.as_mut().iter_mut().zip(nodes) {
-            *to = u[*n as usize];
+        for (node, vector) in nodal.as_mut().iter_mut().enumerate() {
+            *vector = blocks.gather(u, first + block, node);
         }
-        for (q, (rest, out)) in rest.iter().zip(out).enumerate() {
-            *out = E::gradient(&nodal, elements.table.point(q), &rest.inverse_jacobian);
+        for q in 0..points {
+            let (inverse_jacobian, _) = blocks.rest::<V>(first + block, q);
+            out[block * points + q] = E::gradient(&nodal, table.point(q), &inverse_jacobian);
         }
     }
 }
 
 /// See [`ContractKernel`].
-fn contract<E: Element, R: Real>(elements: &Elements<R>, stress: &[[R; 9]], out: &mut [[R; 3]]) {
-    let info = E::info();
-    let points = info.points.len();
-    for ((stress, rest), out) in
-        stress.chunks_exact(points).zip(elements.rest.chunks_exact(points)).zip(out.chunks_exact_mut(info.nodes))
-    {
+#[inline(always)]
+pub(crate) fn contract<E: Element, V: Lanes>(elements: &Elements<V>, stress: &[[V; 9]], f: &mut [Node<V::Scalar>]) {
+    let points = E::info().points.len();
+    let Elements { blocks, first, count, table } = *elements;
+    for block in 0..count {
         let mut forces = E::nodal();
-        for (q, (stress, rest)) in stress.iter().zip(rest).enumerate() {
-            E::contract(stress, elements.table.point(q), &rest.inverse_jacobian, rest.weight, &mut forces);
+        for q in 0..points {
+            let (inverse_jacobian, weight) = blocks.rest::<V>(first + block, q);
+            let stress = &stress[block * points + q];
+            E::contract(stress, table.point(q), &inverse_jacobian, weight, &mut forces);
         }
-        out.copy_from_slice(forces.as_ref());
+        for (node, force) in forces.as_ref().iter().enumerate() {
+            blocks.scatter(*force, f, first + block, node);
+        }
     }
 }
 
 /// See [`NodeGradientKernel`].
-fn node_gradients<E: Element, R: Real>(elements: &Elements<R>, out: &mut [[R; 3]]) {
+#[inline(always)]
+pub(crate) fn node_gradients<E: Element, V: Lanes>(elements: &Elements<V>, out: &mut [[V; 3]]) {
     let info = E::info();
     let points = info.points.len();
-    for (k, (rest, out)) in elements.rest.iter().zip(out.chunks_exact_mut(info.nodes)).enumerate() {
-        let gradients = E::node_gradients(elements.table.point(k % points), &rest.inverse_jacobian);
-        out.copy_from_slice(gradients.as_ref());
+    let Elements { blocks, first, count, table } = *elements;
+    for (k, out) in out.chunks_exact_mut(info.nodes).take(count * points).enumerate() {
+        let (inverse_jacobian, _) = blocks.rest::<V>(first + k / points, k % points);
+        out.copy_from_slice(E::node_gradients(table.point(k % points), &inverse_jacobian).as_ref());
+    }
+}
+
+/// See [`ElementKernels::integrate_nodes`].
+#[inline(always)]
+pub(crate) fn integrate_nodes<V: Lanes>(elements: &Elements<V>, at_points: &[[V; 3]], f: &mut [Node<V::Scalar>]) {
+    let Elements { blocks, first, count, .. } = *elements;
+    let (nodes, points) = (blocks.nodes(), blocks.points());
+    for block in 0..count {
+        for node in 0..nodes {
+            let mut sum = [V::from_f64(0.0); 3];
+            for q in 0..points {
+                let (_, weight) = blocks.rest::<V>(first + block, q);
+                let value = &at_points[(block * points + q) * nodes + node];
+                for i in 0..3 {
+                    sum[i] = sum[i] + value[i] * weight;
+                }
+            }
+            blocks.scatter(sum, f, first + block, node);
+        }
+    }
+}
+
+/// See [`ElementKernels::integrate`].
+#[inline(always)]
+pub(crate) fn integrate<V: Lanes>(elements: &Elements<V>, densities: &[V], out: &mut [V]) {
+    let Elements { blocks, first, count, .. } = *elements;
+    let points = blocks.points();
+    for block in 0..count {
+        let mut sum = V::from_f64(0.0);
+        for q in 0..points {
+            sum = sum + densities[block * points + q] * blocks.rest::<V>(first + block, q).1;
+        }
+        out[block] = sum;
+    }
+}
+
+/// See [`ElementKernels::mean`].
+#[inline(always)]
+pub(crate) fn mean<V: Lanes>(elements: &Elements<V>, tensors: &[[V; 9]], out: &mut [[V; 9]]) {
+    let Elements { blocks, first, count, .. } = *elements;
+    let points = blocks.points();
+    for block in 0..count {
+        let (mut sum, mut volume) = ([V::from_f64(0.0); 9], V::from_f64(0.0));
+        for q in 0..points {
+            let (_, weight) = blocks.rest::<V>(first + block, q);
+            volume = volume + weight;
+            for k in 0..9 {
+                sum[k] = sum[k] + tensors[block * points + q][k] * weight;
+            }
+        }
+        for k in 0..9 {
+            out[block][k] = sum[k] / volume;
+        }
     }
 }

@@ -1,10 +1,10 @@
 //! What generated laws implement, and how a runtime meets them without knowing their types.
 
-use crate::batch;
 use crate::damping::{DampingEntry, Dissipative};
-use crate::point::PointKernels;
+use crate::point::{DampingPointKernels, PointKernels};
 use crate::real::Real;
 use crate::shader::{DampingFunctions, LawFunctions};
+use crate::table::{LawTable, Precision};
 
 /// A constitutive law: point kernels generated from its strain energy density W.
 ///
@@ -24,6 +24,14 @@ pub trait Law: Send + Sync + 'static {
     fn force<R: Real>(constants: &[R], displacement_gradient: &[R; 9]) -> ([R; 9], R);
     /// dP, the differential of P at G in the direction dG.
     fn dforce<R: Real>(constants: &[R], displacement_gradient: &[R; 9], gradient_increment: &[R; 9]) -> [R; 9];
+    /// What is stored of a state for [`Law::apply`].
+    type State<R: Real>: AsRef<[R]> + AsMut<[R]> + Copy;
+    /// Zeros of it.
+    fn state<R: Real>() -> Self::State<R>;
+    /// What of dP does not depend on the increment, as far as it is worth storing.
+    fn linearize<R: Real>(constants: &[R], displacement_gradient: &[R; 9]) -> Self::State<R>;
+    /// dP in the direction dG, from what was stored.
+    fn apply<R: Real>(constants: &[R], state: &Self::State<R>, gradient_increment: &[R; 9]) -> [R; 9];
     /// g . (d2W / dG_i. dG_i.) . g for i = 0, 1, 2, where g is the gradient of one node's interpolation function.
     fn diagonal<R: Real>(constants: &[R], displacement_gradient: &[R; 9], node_gradient: &[R; 3]) -> [R; 3];
     /// The Cauchy stress P F' / J.
@@ -124,6 +132,8 @@ pub struct LawInfo {
     pub constants: &'static [&'static str],
     /// Detected structure.
     pub structure: Structure,
+    /// Numbers that are stored of a point's state for products with the tangent.
+    pub stored: usize,
     /// Operations of each point kernel.
     pub operations: &'static [Operations],
     /// Identifies the law file's text.
@@ -136,34 +146,6 @@ impl LawInfo {
     /// Components of all parameters together.
     pub fn parameter_components(&self) -> usize {
         self.parameters.iter().map(|p| p.len).sum()
-    }
-}
-
-/// A law's batched kernels on linear tetrahedra in one precision; see [`crate::batch`].
-#[derive(Debug, Clone, Copy)]
-pub struct BatchKernels<R: Real> {
-    /// Strain energy of each element.
-    pub energy: batch::EnergyKernel<R>,
-    /// Nodal forces of each element.
-    pub force: batch::ForceKernel<R>,
-    /// Nodal force differentials of each element.
-    pub dforce: batch::DForceKernel<R>,
-    /// Diagonal of the tangent stiffness at each element's nodes.
-    pub diagonal: batch::ForceKernel<R>,
-    /// Cauchy stress of each element.
-    pub cauchy: batch::CauchyKernel<R>,
-}
-
-impl<R: Real> BatchKernels<R> {
-    /// The kernels of a law.
-    pub fn of<L: Law>() -> Self {
-        Self {
-            energy: batch::energy::<L, R>,
-            force: batch::force::<L, R>,
-            dforce: batch::dforce::<L, R>,
-            diagonal: batch::diagonal::<L, R>,
-            cauchy: batch::cauchy::<L, R>,
-        }
     }
 }
 
@@ -185,14 +167,8 @@ pub struct LawEntry {
     pub source: &'static LawSource,
     /// [`Law::material`].
     pub material: fn(&[f64], &mut [f64]),
-    /// Batched kernels in single precision.
-    pub f32: fn() -> BatchKernels<f32>,
-    /// Batched kernels in double precision.
-    pub f64: fn() -> BatchKernels<f64>,
-    /// Kernels at quadrature points in single precision.
-    pub point_f32: fn() -> PointKernels<f32>,
-    /// Kernels at quadrature points in double precision.
-    pub point_f64: fn() -> PointKernels<f64>,
+    /// Its kernels on all lanes.
+    pub(crate) kernels: LawTable,
     /// Point kernels as WGSL, in single precision.
     pub functions: &'static LawFunctions,
     /// Its damping, if it has a dissipation.
@@ -206,9 +182,7 @@ impl LawEntry {
         source: &'static LawSource,
         functions: &'static LawFunctions,
     ) -> Self {
-        let (f32, f64) = (BatchKernels::<f32>::of::<L>, BatchKernels::<f64>::of::<L>);
-        let (point_f32, point_f64) = (PointKernels::<f32>::of::<L>, PointKernels::<f64>::of::<L>);
-        Self { info, source, material: L::material, f32, f64, point_f32, point_f64, functions, damping: None }
+        Self { info, source, material: L::material, kernels: LawTable::of::<L>(), functions, damping: None }
     }
 
     /// The entry with the law's damping; `linear` says whether its differential does not depend on the rate.
@@ -225,5 +199,15 @@ impl LawEntry {
         let mut constants = vec![0.0; self.info.constants.len()];
         (self.material)(parameters, &mut constants);
         constants
+    }
+
+    /// Its kernels at quadrature points, one number at a time.
+    pub fn points<R: Precision>(&self) -> PointKernels<R> {
+        R::law(&self.kernels)
+    }
+
+    /// Those of its damping, if it has a dissipation.
+    pub fn damping_points<R: Precision>(&self) -> Option<DampingPointKernels<R>> {
+        self.damping.as_ref().map(|damping| R::damping(&damping.kernels))
     }
 }

@@ -1,27 +1,32 @@
 //! Soft-body kernels generated from the strain energy densities in `laws/`, and the traits that they implement.
 //!
 //! Generated code implements [`Law`] for any [`Real`]: strain energy density W, first Piola-Kirchhoff stress
-//! P = dW/dG, its differential dP in a direction dG, the diagonal of the tangent, and the Cauchy stress. The loops in
-//! [`batch`] compose a law with the linear tetrahedron into nodal forces, [`composed`] with any element. [`laws`] and
-//! [`elements`] list what this build has.
+//! P = dW/dG, its differential dP in a direction dG, the diagonal of the tangent, and the Cauchy stress. [`compose`] puts
+//! a law and an element together, on the widest registers that the machine has. [`laws`] and [`elements`] list what this
+//! build has.
 
 // Generated text names this crate as any other crate would.
 extern crate self as tensormass_kernels;
 
-pub mod batch;
-pub mod composed;
+mod blocks;
+mod composed;
 pub mod damping;
 pub mod element;
+mod lanes;
 mod law;
 pub mod point;
 mod real;
 pub mod shader;
+mod table;
 
-pub use composed::{Composed, ComposedBatch};
-pub use damping::{DampingEntry, DampingKernels, Dissipative};
+pub use blocks::{Blocks, Cluster, States, copy_nodes, most_nodes};
+pub use composed::{Compute, compose};
+pub use damping::{DampingEntry, Dissipative};
 pub use element::{Element, ElementEntry, ElementInfo, Face, Numbering, ReferencePoint, RestPoint, Term};
-pub use law::{Acceptance, BatchKernels, Law, LawEntry, LawInfo, LawSource, Operations, ParameterInfo, Structure};
+pub use lanes::{Engine, Lanes, Node};
+pub use law::{Acceptance, Law, LawEntry, LawInfo, LawSource, Operations, ParameterInfo, Structure};
 pub use real::Real;
+pub use table::Precision;
 // Generated text computes constants in it.
 #[doc(hidden)]
 pub use real::twofold::Twofold;
@@ -59,10 +64,10 @@ pub fn element(name: &str) -> Option<&'static ElementEntry> {
     elements().iter().find(|e| e.info.name == name)
 }
 
-/// The linear tetrahedron, which the fused kernels of [`batch`] compute.
+/// The linear tetrahedron.
 ///
 /// # Panics
-/// Never: the generator prints those kernels from its declaration.
+/// Never: the generator has its declaration.
 pub fn linear_tetrahedron() -> &'static ElementEntry {
-    elements().iter().find(|e| e.info.is_linear_simplex).expect("the fused kernels are of a declared element")
+    elements().iter().find(|e| e.info.is_linear_simplex).expect("it is declared")
 }

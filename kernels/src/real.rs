@@ -27,6 +27,8 @@ pub trait Real:
     fn to_f64(self) -> f64;
     /// a b + c, rounded once.
     fn mul_add(self, b: Self, c: Self) -> Self;
+    /// a b + c, rounded once where the machine does that as fast, and else twice.
+    fn multiply_add(self, b: Self, c: Self) -> Self;
     /// Square root.
     fn sqrt(self) -> Self;
     /// Natural logarithm.
@@ -74,6 +76,10 @@ macro_rules! float {
             #[inline(always)]
             fn mul_add(self, b: Self, c: Self) -> Self {
                 <$t>::mul_add(self, b, c)
+            }
+            #[inline(always)]
+            fn multiply_add(self, b: Self, c: Self) -> Self {
+                self * b + c
             }
             #[inline(always)]
             fn sqrt(self) -> Self {
@@ -130,6 +136,9 @@ impl Real for Twofold {
         Twofold::to_f64(self)
     }
     fn mul_add(self, b: Self, c: Self) -> Self {
+        self * b + c
+    }
+    fn multiply_add(self, b: Self, c: Self) -> Self {
         self * b + c
     }
     fn sqrt(self) -> Self {

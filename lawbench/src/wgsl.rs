@@ -200,7 +200,9 @@ mod gpu {
         info.domain = subject.law.domain.as_ref().map(|d| leaked(&d.text));
         info.constants = Box::leak(vec![""; subject.derivation.constants.len()].into_boxed_slice());
         let (info, functions) = (Box::leak(Box::new(info)), Box::leak(Box::new(functions)));
-        Box::leak(Box::new(LawEntry { info, functions, damping: None, ..like }))
+        let mut entry = like;
+        (entry.info, entry.functions, entry.damping) = (info, functions, None);
+        Box::leak(Box::new(entry))
     }
 
     fn leaked(text: &str) -> &'static str {

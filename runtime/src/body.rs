@@ -77,7 +77,7 @@ pub struct LawBatch {
     pub law: &'static LawEntry,
     /// The kind of element.
     pub element: &'static ElementEntry,
-    /// The mesh's number of each element, ascending.
+    /// The mesh's number of each element, those near each other together (see [`crate::order`]).
     pub elements: Vec<u32>,
     /// The law's constants: one set, or one set an element.
     pub constants: Vec<f64>,

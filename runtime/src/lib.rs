@@ -22,6 +22,7 @@ pub mod mass;
 pub mod measure;
 pub mod mesh;
 pub mod model;
+pub mod order;
 pub mod output;
 pub mod plan;
 pub mod probe;

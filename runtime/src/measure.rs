@@ -19,7 +19,8 @@ use crate::gpu::{GpuBackend, GpuField};
 use crate::integrate::SemiImplicitEuler;
 use crate::mesh::beam_of;
 use crate::model::{BuildError, Model, build};
-use crate::plan::{operations, point_operations};
+use crate::order::cluster_nodes;
+use crate::plan::{operations, point_operations, tangent_operations};
 use crate::scene::{self, SceneError};
 use crate::system::{Integrator, SolveError, System};
 use crate::target::Target;
@@ -36,8 +37,8 @@ pub struct Subject {
     pub law: &'static LawEntry,
     /// What the beam is made of.
     pub element: &'static ElementEntry,
-    /// Elements, about.
-    pub elements: usize,
+    /// Cells of the beam along x, y and z (see [`cells`]).
+    pub cells: [usize; 3],
     /// Numbers of state and kernels.
     pub precision: scene::Precision,
     /// Times that an operation is repeated, at least 1.
@@ -205,8 +206,7 @@ pub fn cells(element: &'static ElementEntry, elements: usize) -> [usize; 3] {
 }
 
 fn measure(target: &Target, subject: &Subject) -> Result<Measured, MeasureError> {
-    let cells = cells(subject.element, subject.elements);
-    let text = scene_text(subject.law, subject.element.info, cells, subject.precision);
+    let text = scene_text(subject.law, subject.element.info, subject.cells, subject.precision);
     let model = build(&scene::parse(&text, "bench.toml", &[])?)?;
     match (target, subject.precision) {
         (Target::Cpu, scene::Precision::F32) => on_cpu::<f32>(subject, model),
@@ -215,7 +215,10 @@ fn measure(target: &Target, subject: &Subject) -> Result<Measured, MeasureError>
         (Target::Gpu(gpu, options), scene::Precision::F32) => {
             let backend = GpuBackend::new(std::sync::Arc::clone(gpu), &model.body, *options)?;
             let field = GpuField::new(&backend, &model.body)?;
-            all(subject, model, backend, field, Layout { real: 4.0, vector: 16.0, point: 48.0 })
+            // Each node of each element has a slot.
+            let slots = subject.element.info.nodes as f64;
+            let layout = Layout { real: 4.0, vector: 16.0, slot: 16.0, point: 48.0, place: 4.0, slots, local: 0.0 };
+            all(subject, model, backend, field, layout)
         }
         #[cfg(feature = "gpu")]
         (Target::Gpu(..), scene::Precision::F64) => Err(DeviceError::Precision.into()),
@@ -226,7 +229,11 @@ fn on_cpu<R: Precision>(subject: &Subject, model: Model) -> Result<Measured, Mea
     let backend = CpuBackend::<R>::new(model.body.masses.len(), model.body.constraints.clone());
     let field = CpuField::<R>::new(&model.body);
     let real = size_of::<R>() as f64;
-    all(subject, model, backend, field, Layout { real, vector: 3.0 * real, point: 10.0 * real })
+    let clustered: usize = model.body.batches.iter().map(|b| cluster_nodes(&model.body, b)).sum();
+    let slots = clustered as f64 / model.body.elements.len() as f64;
+    let layout =
+        Layout { real, vector: 3.0 * real, slot: 4.0 * real, point: 10.0 * real, place: 2.0, slots, local: 4.0 };
+    all(subject, model, backend, field, layout)
 }
 
 /// Bytes of a device's structures.
@@ -234,10 +241,18 @@ fn on_cpu<R: Precision>(subject: &Subject, model: Model) -> Result<Measured, Mea
 struct Layout {
     /// A number.
     real: f64,
-    /// A vector at a node, or in a slot.
+    /// A vector at a node.
     vector: f64,
+    /// A partial force.
+    slot: f64,
     /// Rest data of a quadrature point.
     point: f64,
+    /// What tells an element where its node is.
+    place: f64,
+    /// Partial forces an element.
+    slots: f64,
+    /// What tells a cluster which node of the body each of its own is; 0 without clusters.
+    local: f64,
 }
 
 /// Counts an element's operations and bytes.
@@ -256,18 +271,20 @@ impl Count<'_> {
         operations(info, gathers, times * point_operations(self.subject.law.info, kernel) + contract)
     }
 
-    /// What every element pass reads: nodes, rest data, and so many vectors once each.
-    fn read(&self, vectors: u32) -> f64 {
-        let info = self.subject.element.info;
-        4.0 * info.nodes as f64
-            + self.layout.point * info.points.len() as f64
-            + f64::from(vectors) * self.layout.vector * self.nodes
+    /// What every element pass reads: nodes, rest data, so many vectors once each, and so many stored numbers a point.
+    fn read(&self, vectors: u32, stored: usize) -> f64 {
+        let (info, layout) = (self.subject.element.info, &self.layout);
+        let point = layout.point + layout.real * stored as f64;
+        layout.place * info.nodes as f64
+            + layout.local * layout.slots
+            + point * info.points.len() as f64
+            + f64::from(vectors) * layout.vector * self.nodes
     }
 
     /// Slots that are written and read, their numbers, and the sums that are read and written.
-    fn two_passes(&self, vectors: u32) -> f64 {
-        let slots = self.subject.element.info.nodes as f64;
-        self.read(vectors) + slots * (2.0 * self.layout.vector + 4.0) + 2.0 * self.layout.vector * self.nodes
+    fn two_passes(&self, vectors: u32, stored: usize) -> f64 {
+        let layout = &self.layout;
+        self.read(vectors, stored) + layout.slots * (2.0 * layout.slot + 4.0) + 2.0 * layout.vector * self.nodes
     }
 }
 
@@ -304,7 +321,10 @@ fn all<B: Backend, F: ForceField<B>>(
     let at = |p: &[f64; 3]| if plane { [wave(p)[0], wave(p)[1], 0.0] } else { wave(p) };
     let scaled = |p: &[f64; 3]| at(p).map(|u| u / model.scale.length);
     let u = backend.upload(&model.mesh.nodes().iter().map(scaled).collect::<Vec<_>>());
+    let direction = |p: &[f64; 3]| at(&[p[1], p[2], p[0]]);
+    let du = backend.upload(&model.mesh.nodes().iter().map(direction).collect::<Vec<_>>());
     let mut f = backend.zeros();
+    let on_cpu = layout.local > 0.0;
     let repeats = subject.repeats.max(1);
     let linear = subject.law.info.structure.linear;
     let (vectors, per_node) = (if linear { 1 } else { 2 }, subject.element.info.nodes as u32);
@@ -318,32 +338,40 @@ fn all<B: Backend, F: ForceField<B>>(
         field.add_force(&backend, &u, &mut f)?;
         done(&backend)
     })?;
-    field.prepare(&backend, &u);
     let dforce = time("dforce", repeats, || {
-        field.add_dforce(&backend, &u, 1.0, &mut f);
+        field.add_dforce_at(&backend, &u, &du, 1.0, &mut f);
+        done(&backend)
+    })?;
+    let linearize = time("linearize", repeats, || {
+        field.prepare(&backend, &u);
+        done(&backend)
+    })?;
+    let apply = time("apply", repeats, || {
+        field.add_dforce(&backend, &du, 1.0, &mut f);
         done(&backend)
     })?;
     let diagonal = time("diagonal", repeats, || {
         field.add_diagonal(&backend, 1.0, &mut f);
         done(&backend)
     })?;
+    let stored = if on_cpu { subject.law.info.stored } else { 0 };
+    let counted = |timing, flops, bytes| Timing { flops: Some(flops), bytes: Some(bytes), ..timing };
+    let (contract, apply_flops) = (subject.element.info.contract_operations, tangent_operations(subject.law.info));
+    let of_apply = match on_cpu {
+        true => operations(subject.element.info, 1, apply_flops + contract),
+        false => count.flops(vectors, "dforce", 1, true),
+    };
+    // A device that stores nothing copies the state, and has to read it again.
+    let applied = if on_cpu { 1 } else { vectors };
+    let written = count.layout.real * (stored * subject.element.info.points.len()) as f64;
+    let of_linearize = if stored > 0 { count.flops(1, "linearize", 1, false) } else { 0 };
     let mut timings = vec![
-        Timing {
-            flops: Some(count.flops(1, "energy", 1, false)),
-            bytes: Some(count.read(1) + count.layout.real),
-            ..energy
-        },
-        Timing { flops: Some(count.flops(1, "force", 1, true)), bytes: Some(count.two_passes(1)), ..force },
-        Timing {
-            flops: Some(count.flops(vectors, "dforce", 1, true)),
-            bytes: Some(count.two_passes(vectors)),
-            ..dforce
-        },
-        Timing {
-            flops: Some(count.flops(vectors - 1, "diagonal", per_node, false)),
-            bytes: Some(count.two_passes(vectors - 1)),
-            ..diagonal
-        },
+        counted(energy, count.flops(1, "energy", 1, false), count.read(1, 0) + count.layout.real),
+        counted(force, count.flops(1, "force", 1, true), count.two_passes(1, 0)),
+        counted(dforce, count.flops(vectors, "dforce", 1, true), count.two_passes(vectors, 0)),
+        counted(linearize, of_linearize, count.read(1, 0) + written),
+        counted(apply, of_apply, count.two_passes(applied, stored)),
+        counted(diagonal, count.flops(vectors - 1, "diagonal", per_node, false), count.two_passes(vectors - 1, 0)),
     ];
     let mut system = System::new(backend, field, model.body);
     timings.push(explicit(&mut system, repeats)?);

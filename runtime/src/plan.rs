@@ -6,6 +6,7 @@ use tensormass_kernels::{ElementInfo, LawEntry, LawInfo};
 use crate::body::LawBatch;
 use crate::mesh::Quality;
 use crate::model::Model;
+use crate::order::cluster_nodes;
 use crate::scene::{Integrator, Precision, Scene};
 
 /// How buffers are laid out: they differ between the CPU and GPUs.
@@ -106,12 +107,17 @@ impl Plan {
                     Precision::F32 => 4,
                     Precision::F64 => 8,
                 };
+                // The nodes of clusters, of which each has a partial force, and a number both ways.
+                let clustered: usize = model.body.batches.iter().map(|b| cluster_nodes(&model.body, b)).sum();
+                let of_points = |b: &LawBatch| b.elements.len() * b.element.info.points.len();
+                let stored: usize = model.body.batches.iter().map(|b| b.law.info.stored * of_points(b)).sum();
                 vec![
-                    ("element nodes", 4 * slots),
+                    ("element nodes", 2 * slots),
                     ("rest data", 10 * real * points),
                     ("material constants", real * constants),
-                    ("partial forces", 3 * real * slots),
-                    ("node slots", 4 * (slots + nodes + 1)),
+                    ("partial forces", 4 * real * clustered),
+                    ("nodes of clusters, slots of nodes", 8 * clustered + 4 * (nodes + 1)),
+                    ("stored tangent", if implicit { real * stored } else { 0 }),
                     ("state and work vectors", vectors * 3 * real * nodes),
                     ("consistent mass", (4 + real) * entries + 4 * rows),
                 ]
@@ -215,6 +221,12 @@ pub(crate) fn point_operations(law: &LawInfo, kernel: &str) -> u32 {
     law.operations.iter().find(|o| o.kernel == kernel).map_or(0, |o| o.arithmetic())
 }
 
+/// Operations of dP at a point from what is stored of the state: G, if there is no kernel of its own.
+pub(crate) fn tangent_operations(law: &LawInfo) -> u32 {
+    let own = law.operations.iter().find(|o| o.kernel == "apply");
+    own.map_or_else(|| point_operations(law, "dforce"), |o| o.arithmetic())
+}
+
 /// The kernels of a law's damping, each with its operations an element.
 fn damping_kernels(law: &LawEntry, element: &'static ElementInfo) -> impl Iterator<Item = (&'static str, u32)> {
     let (info, linear) = (law.info, law.damping.map(|damping| damping.linear));
@@ -234,6 +246,11 @@ fn law(batch: &LawBatch, implicit: bool, proportional: bool) -> PlannedLaw {
     let point = |name: &str| point_operations(info, name);
     let gathers = if info.structure.linear { 1 } else { 2 };
     let mut kernels = vec![("force", operations(element, 1, point("force") + element.contract_operations))];
+    if implicit {
+        // Of an element's tangent what does not depend on the increment is stored.
+        kernels.push(("linearize", operations(element, 1, point("linearize"))));
+        kernels.push(("apply", operations(element, 1, tangent_operations(info) + element.contract_operations)));
+    }
     if implicit || proportional {
         kernels.push(("dforce", operations(element, gathers, point("dforce") + element.contract_operations)));
     }

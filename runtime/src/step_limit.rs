@@ -16,7 +16,7 @@ use nalgebra::DMatrix;
 
 use crate::backend::{Backend, ForceField};
 use crate::body::Body;
-use crate::cpu::{Kernels, Part};
+use crate::cpu::One;
 use crate::system::System;
 
 /// The critical steps of a body.
@@ -45,7 +45,7 @@ pub fn element_limit(body: &Body) -> f64 {
     let mut least = f64::INFINITY;
     for (number, batch) in body.batches.iter().enumerate() {
         let count = batch.law.info.constants.len();
-        let kernels = Kernels::<f64>::new(batch.element, batch.law);
+        let nodes = batch.element.info.nodes;
         for (i, &e) in batch.elements.iter().enumerate() {
             let rest = &body.rest[e as usize];
             let start = if batch.per_element { i * count } else { 0 };
@@ -55,12 +55,12 @@ pub fn element_limit(body: &Body) -> f64 {
             let mut key = vec![number as u64];
             key.extend(numbers.chain(constants).chain([&mass]).map(|x| x.to_bits()));
             let value = *known.entry(key).or_insert_with(|| {
-                let part = Part { nodes: &numbers_to(kernels.nodes()), rest, constants, stride: 0, count };
-                let still = vec![[0.0; 3]; kernels.nodes()];
+                let one = One::new(batch.element, batch.law, rest, constants);
+                let still = vec![[0.0; 3]; nodes];
                 let masses: Vec<f64> = batch.element.info.lumping.iter().map(|m| m * mass).collect();
-                let k = element_eigenvalue(|x, y| kernels.dforce(&part, &still, x, y), &masses);
+                let k = element_eigenvalue(|x, y| one.dforce(&still, x, y), &masses);
                 let viscous = match batch.law.damping {
-                    Some(_) => element_eigenvalue(|x, y| kernels.ddamping(&part, [&still, &still, x], y), &masses),
+                    Some(_) => element_eigenvalue(|x, y| one.ddamping([&still, &still, x], y), &masses),
                     None => 0.0,
                 };
                 step_of(k, viscous + body.stiffness_damping * k)
@@ -69,10 +69,6 @@ pub fn element_limit(body: &Body) -> f64 {
         }
     }
     least
-}
-
-fn numbers_to(n: usize) -> Vec<u32> {
-    (0..n as u32).collect()
 }
 
 /// The largest eigenvalue of an element's M_e^-1 K_e, where `product` is -K_e du.

@@ -11,7 +11,7 @@ use tensormass_kernels::{ElementEntry, elements, laws};
 use tensormass_runtime::LawEntry;
 use tensormass_runtime::backend::{Backend, ForceField};
 use tensormass_runtime::cg::CgLimits;
-use tensormass_runtime::cpu::{Kernels, Part};
+use tensormass_runtime::cpu::One;
 use tensormass_runtime::integrate::{NewtonLimits, SolverSettings, Statics};
 use tensormass_runtime::mesh::{Mesh, integrals};
 use tensormass_runtime::scene::Preconditioner;
@@ -20,10 +20,7 @@ use tensormass_runtime::system::Integrator;
 /// One distorted element with its kernels; displacements are given at its nodes.
 struct Single {
     element: &'static ElementEntry,
-    kernels: Kernels<f64>,
-    nodes: Vec<u32>,
-    rest: Vec<tensormass_kernels::RestPoint<f64>>,
-    constants: Vec<f64>,
+    kernels: One,
 }
 
 type Nodal = Vec<[f64; 3]>;
@@ -33,29 +30,17 @@ impl Single {
         // Corners at random places near those of a regular element, edges straight.
         let mesh = distorted(&unit(element, 2), 0.3, 5);
         let e = mesh.elements().next().expect("an element");
-        Self {
-            element,
-            kernels: Kernels::new(element, law),
-            nodes: (0..element.info.nodes as u32).collect(),
-            rest: mesh.rest(e),
-            constants: law.constants(&parameters(law)),
-        }
-    }
-
-    fn part(&self) -> Part<'_, f64> {
-        let Self { nodes, rest, constants, .. } = self;
-        Part { nodes, rest, constants, stride: 0, count: constants.len() }
+        Self { element, kernels: One::new(element, law, &mesh.rest(e), &law.constants(&parameters(law))) }
     }
 
     fn zeros(&self) -> Nodal {
-        vec![[0.0; 3]; self.nodes.len()]
+        vec![[0.0; 3]; self.element.info.nodes]
     }
 
     fn random(&self, size: f64, seed: u64) -> Nodal {
         let mut random = Random(seed);
         let plane = self.element.info.dimension == 2;
-        let vector = |_: &u32| random.vector(size).map(|x| x);
-        let mut all: Nodal = self.nodes.iter().map(vector).collect();
+        let mut all: Nodal = (0..self.element.info.nodes).map(|_| random.vector(size)).collect();
         if plane {
             all.iter_mut().for_each(|v| v[2] = 0.0);
         }
@@ -63,20 +48,18 @@ impl Single {
     }
 
     fn energy(&self, u: &Nodal) -> f64 {
-        let mut w = [0.0];
-        assert!(self.kernels.energy(&self.part(), u, &mut w).is_none(), "outside the domain");
-        w[0]
+        self.kernels.energy(u).expect("the element is in the domain")
     }
 
     fn force(&self, u: &Nodal) -> Nodal {
         let mut f = self.zeros();
-        assert!(self.kernels.force(&self.part(), u, &mut f).is_none(), "outside the domain");
+        assert!(self.kernels.force(u, &mut f), "outside the domain");
         f
     }
 
     fn dforce(&self, u: &Nodal, du: &Nodal) -> Nodal {
         let mut f = self.zeros();
-        self.kernels.dforce(&self.part(), u, du, &mut f);
+        self.kernels.dforce(u, du, &mut f);
         f
     }
 }
@@ -139,7 +122,7 @@ fn tangents_are_symmetric_and_diagonals_theirs() {
             "{name}: {ab} {ba}"
         );
         let mut diagonal = single.zeros();
-        single.kernels.diagonal(&single.part(), &u, &mut diagonal);
+        single.kernels.diagonal(&u, &mut diagonal);
         let size = diagonal.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
         for n in 0..u.len() {
             for i in 0..single.element.info.dimension {
@@ -185,29 +168,6 @@ fn nothing_but_rigid_motions_costs_nothing() {
         assert!(values[rigid - 1].abs() <= 1e-12 * greatest, "{name}: {:?}", &values[..rigid + 1]);
         assert!(values[rigid] > 1e-6 * greatest, "{name}: a mode without stiffness: {:?}", &values[..rigid + 1]);
     });
-}
-
-/// The fused kernels of the linear tetrahedron and the composed ones are one formula.
-#[test]
-fn composed_and_fused_kernels_agree() {
-    let element = tensormass_kernels::linear_tetrahedron();
-    for law in laws() {
-        let single = Single::new(element, law);
-        let composed = tensormass_kernels::Composed::<f64>::new(element, law);
-        let batch = tensormass_kernels::ComposedBatch {
-            nodes: &single.nodes,
-            rest: &single.rest,
-            constants: &single.constants,
-            stride: 0,
-            count: single.constants.len(),
-        };
-        let (u, du) = (single.random(0.03, 8), single.random(1.0, 9));
-        let (mut f, mut df) = (single.zeros(), single.zeros());
-        assert!(composed.force(&batch, &u, &mut f).is_none());
-        composed.dforce(&batch, &u, &du, &mut df);
-        assert_eq!(f, single.force(&u), "{}", law.info.name);
-        assert_eq!(df, single.dforce(&u, &du), "{}", law.info.name);
-    }
 }
 
 /// Static equilibrium where all nodes of the boundary are at G X: all others have to be there, too.

@@ -122,23 +122,31 @@ impl Builder {
     pub fn finish(self, name: &str, inputs: Vec<(Input, u32)>, outputs: Vec<(Output, Vec<ValueId>)>) -> KernelIr {
         let mut values = self.values;
         fuse_divisions(&mut values, &outputs);
-        let live = live_values(&values, &outputs);
-        let mut renumbered = vec![None; values.len()];
-        let mut kept = Vec::new();
-        for (i, definition) in values.into_iter().enumerate() {
+        KernelIr { name: name.to_string(), inputs, values, outputs }.without_dead_values()
+    }
+}
+
+impl KernelIr {
+    /// The kernel without values that no output needs.
+    pub(super) fn without_dead_values(self) -> Self {
+        let live = live_values(&self.values, &self.outputs);
+        let mut renumbered = vec![None; self.values.len()];
+        let mut values = Vec::new();
+        for (i, definition) in self.values.into_iter().enumerate() {
             if live[i] {
                 let op = definition.op.map(|v| renumbered[v.index()].expect("operands of live values are live"));
-                renumbered[i] = Some(ValueId(kept.len() as u32));
-                kept.push(Definition { op, name: definition.name });
+                renumbered[i] = Some(ValueId(values.len() as u32));
+                values.push(Definition { op, name: definition.name });
             }
         }
-        let outputs = outputs
+        let outputs = self
+            .outputs
             .into_iter()
             .map(|(role, ids)| {
                 (role, ids.into_iter().map(|v| renumbered[v.index()].expect("outputs are live")).collect())
             })
             .collect();
-        KernelIr { name: name.to_string(), inputs, values: kept, outputs }
+        Self { values, outputs, ..self }
     }
 }
 

@@ -31,6 +31,7 @@
 
 mod build;
 mod count;
+mod cut;
 mod interpret;
 mod text;
 mod validate;
@@ -39,6 +40,7 @@ pub use crate::remainder::Remainder;
 pub use crate::twofold::Twofold;
 pub use build::Builder;
 pub use count::OperationCount;
+pub use cut::Cut;
 pub use interpret::{InterpretError, Number};
 pub use text::IrTextError;
 pub use validate::{InvalidKernel, ValidKernel};
@@ -69,6 +71,8 @@ pub enum Input {
     GradientRate,
     /// dG, the direction of a differential (by G, or by its rate), 9 components.
     GradientIncrement,
+    /// What a linearisation has stored of the state; see [`Cut`].
+    State,
     /// g, the gradient of one node's interpolation function, 3 components (1/m).
     NodeGradient,
     /// The nodal displacements of an element, 3 a node.
@@ -97,6 +101,8 @@ pub enum Output {
     Stress,
     /// dP, the differential of P in the direction dG, 9 components.
     StressIncrement,
+    /// What [`Input::State`] reads.
+    State,
     /// g . (d2W/dG_i.dG_i.) . g for the displacement components i: one node's diagonal of the tangent, 3 components.
     Diagonal,
     /// The Cauchy stress P F' / J, 9 components.

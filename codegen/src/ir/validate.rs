@@ -27,7 +27,7 @@ pub struct InvalidKernel {
 
 fn input_length(role: Input) -> Option<u32> {
     match role {
-        Input::Parameters | Input::Constants | Input::NodalDisplacement => None,
+        Input::Parameters | Input::Constants | Input::State | Input::NodalDisplacement => None,
         Input::ShapeGradients | Input::ReferenceGradients => None,
         Input::DisplacementGradient | Input::GradientRate | Input::GradientIncrement => Some(9),
         Input::StressIn | Input::InverseJacobian => Some(9),
@@ -38,7 +38,7 @@ fn input_length(role: Input) -> Option<u32> {
 
 fn output_length(role: Output) -> Option<usize> {
     match role {
-        Output::Constants | Output::NodalForce | Output::NodeGradients => None,
+        Output::Constants | Output::State | Output::NodalForce | Output::NodeGradients => None,
         Output::EnergyDensity | Output::DissipationDensity | Output::DomainMargin | Output::NearRest => Some(1),
         Output::Stress | Output::StressIncrement | Output::Cauchy | Output::DisplacementGradient => Some(9),
         Output::Diagonal => Some(3),

@@ -3,9 +3,9 @@
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{ToTokens, format_ident, quote};
 
-use crate::derivation::{DAMPING_KERNELS, Derivation, PointKernel};
+use crate::derivation::{DAMPING_KERNELS, Derivation, PointKernel, Tangent};
 use crate::element::ElementKernels;
-use crate::ir::{Input, Op, Output, Rational, ValidKernel, ValueId};
+use crate::ir::{Cut, Input, Op, Output, Rational, ValidKernel, ValueId};
 use crate::law::ast::{Law, Parameter};
 use crate::print::naming::{self, ValueName, constants, kernel_docs, letter};
 
@@ -35,9 +35,10 @@ pub fn law_module(law: &Law, derivation: &Derivation, reviewed: bool) -> TokenSt
         let margin = needs_margin(k);
         let near = point_kernel(k.near, &format!("{}_near", k.name()), margin);
         let far = point_kernel(far, &far.ir().name, margin);
-        quote!(#near #[cold] #[inline(never)] #far)
+        quote!(#near #far)
     });
     let damping = damping(derivation);
+    let tangent = tangent(derivation);
     quote! {
         #docs
         pub mod #module {
@@ -51,11 +52,57 @@ pub fn law_module(law: &Law, derivation: &Derivation, reviewed: bool) -> TokenSt
                 fn info() -> &'static LawInfo { &INFO }
                 #material
                 #(#methods)*
+                #tangent
             }
             #(#forms)*
             #damping
         }
     }
+}
+
+/// A law's tangent in two parts: what is stored of a state, and dP from it.
+fn tangent(derivation: &Derivation) -> TokenStream {
+    let tangent = derivation.tangent();
+    let stored = plain(tangent.stored());
+    let (linearize, apply) = match &tangent {
+        Tangent::Cut(Cut { linearize, apply }) => {
+            let none = quote! {
+                #[inline(always)]
+                fn linearize<R: Real>(_c: &[R], _g: &[R; 9]) -> [R; 0] { [] }
+            };
+            let linearize = linearize.as_ref().map_or(none, |k| point_kernel(k, "linearize", false));
+            let mut arguments = arguments(apply);
+            if linearize_is_empty(&tangent) {
+                arguments.insert(arguments.len() - 1, quote!(_state: &[R; 0]));
+            }
+            (linearize, function(apply, "apply", &arguments, false))
+        }
+        Tangent::Gradient => {
+            let linearize = quote! {
+                /// G itself: the differential has a form near rest and one for elsewhere.
+                #[inline(always)]
+                fn linearize<R: Real>(_c: &[R], g: &[R; 9]) -> [R; 9] { *g }
+            };
+            let apply = quote! {
+                /// dP = d2W/dG2 : dG at G, which was stored.
+                #[inline(always)]
+                fn apply<R: Real>(c: &[R], state: &[R; 9], dg: &[R; 9]) -> [R; 9] {
+                    <Self as ::tensormass_kernels::Law>::dforce(c, state, dg)
+                }
+            };
+            (linearize, apply)
+        }
+    };
+    quote! {
+        type State<R: Real> = [R; #stored];
+        fn state<R: Real>() -> [R; #stored] { [R::from_f64(0.0); #stored] }
+        #linearize
+        #apply
+    }
+}
+
+fn linearize_is_empty(tangent: &Tangent) -> bool {
+    tangent.stored() == 0
 }
 
 /// The damping of a law with a dissipation.
@@ -102,6 +149,7 @@ pub fn element_module(element: &ElementKernels) -> TokenStream {
         quote!(#name(#(#arguments),*))
     });
     let info = element_info(element);
+    let each = (0..element.nodes as usize).map(plain);
     quote! {
         #docs
         pub mod #module {
@@ -133,7 +181,7 @@ pub fn element_module(element: &ElementKernels) -> TokenStream {
                 #[inline(always)]
                 fn node_gradients<R: Real>(slopes: &[R], inverse_jacobian: &[R; 9]) -> [[R; 3]; #nodes] {
                     let n = #node_gradients;
-                    ::std::array::from_fn(|j| [n[3 * j], n[3 * j + 1], n[3 * j + 2]])
+                    [#([n[3 * #each], n[3 * #each + 1], n[3 * #each + 2]]),*]
                 }
             }
             #(#functions)*
@@ -234,7 +282,13 @@ fn info(law: &Law, derivation: &Derivation, reviewed: bool) -> TokenStream {
     let constants = &derivation.constants;
     let structure = crate::structure::detect(law, derivation);
     let crate::structure::Structure { linear, isotropic, uses_j, uses_fibres, polynomial } = structure;
-    let operations = derivation.kernels[1..].iter().map(|k| {
+    let tangent = derivation.tangent();
+    let stored = plain(tangent.stored());
+    let parts = match &tangent {
+        Tangent::Cut(cut) => cut.linearize.iter().chain([&cut.apply]).collect(),
+        Tangent::Gradient => vec![],
+    };
+    let operations = derivation.kernels[1..].iter().chain(parts).map(|k| {
         let (name, c) = (&k.ir().name, k.count());
         let counts = [c.additions, c.multiplications, c.divisions, c.functions, c.selects];
         let [a, m, d, f, s] = counts.map(|n| plain(n as usize));
@@ -255,6 +309,7 @@ fn info(law: &Law, derivation: &Derivation, reviewed: bool) -> TokenStream {
                 linear: #linear, isotropic: #isotropic, uses_j: #uses_j, uses_fibres: #uses_fibres,
                 polynomial: #polynomial,
             },
+            stored: #stored,
             operations: &[#(#operations),*],
             hash: #hash,
             reviewed: #reviewed,
@@ -350,7 +405,11 @@ fn two_forms(kernel: &PointKernel, far: &ValidKernel, needs_margin: bool) -> Tok
     let [near, other] = ["n", "f"].map(|p| (0..lengths.len()).map(|k| format_ident!("{p}{k}")).collect::<Vec<_>>());
     let chosen = near.iter().zip(&other).zip(&lengths).map(|((n, f), &len)| match len {
         1 => quote!(R::select_greater(near, zero, #n, #f)),
-        _ => quote!(::std::array::from_fn(|k| R::select_greater(near, zero, #n[k], #f[k]))),
+        // Written out: a closure would not be compiled for the machine's lanes.
+        _ => {
+            let entries = (0..len).map(plain).map(|k| quote!(R::select_greater(near, zero, #n[#k], #f[#k])));
+            quote!([#(#entries),*])
+        }
     });
     // The near form has the margin of its own form last, but for a margin of a law without a domain.
     let (mut pattern, near_name_value) = (near.iter().map(|n| quote!(#n)).collect::<Vec<_>>(), format_ident!("near"));
@@ -377,9 +436,12 @@ fn two_forms(kernel: &PointKernel, far: &ValidKernel, needs_margin: bool) -> Tok
 }
 
 fn point_kernel(kernel: &ValidKernel, name: &str, needs_margin: bool) -> TokenStream {
-    let inline = if name.ends_with(crate::derivation::FAR) { quote!() } else { quote!(#[inline(always)]) };
+    function(kernel, name, &arguments(kernel), needs_margin)
+}
+
+/// A kernel as a function with these arguments.
+fn function(kernel: &ValidKernel, name: &str, arguments: &[TokenStream], needs_margin: bool) -> TokenStream {
     let name = format_ident!("{name}");
-    let arguments = arguments(kernel);
     let (result, body) = (result(kernel, needs_margin), body(kernel, needs_margin));
     let docs = doc_comment(&kernel_docs(kernel));
     let constants = kernel.reads(Input::Constants).then(|| {
@@ -388,7 +450,7 @@ fn point_kernel(kernel: &ValidKernel, name: &str, needs_margin: bool) -> TokenSt
     });
     quote! {
         #docs
-        #inline
+        #[inline(always)]
         fn #name<R: Real>(#(#arguments),*) -> #result {
             #constants
             #body
@@ -397,7 +459,14 @@ fn point_kernel(kernel: &ValidKernel, name: &str, needs_margin: bool) -> TokenSt
 }
 
 fn result(kernel: &ValidKernel, needs_margin: bool) -> TokenStream {
-    let mut types: Vec<TokenStream> = kernel.ir().outputs.iter().map(|(_, ids)| array_type(ids.len())).collect();
+    let type_of = |(role, ids): &(Output, Vec<ValueId>)| match is_array(*role, ids.len()) {
+        true => {
+            let n = plain(ids.len());
+            quote!([R; #n])
+        }
+        false => quote!(R),
+    };
+    let mut types: Vec<TokenStream> = kernel.ir().outputs.iter().map(type_of).collect();
     if needs_margin {
         types.push(quote!(R));
     }
@@ -407,6 +476,11 @@ fn result(kernel: &ValidKernel, needs_margin: bool) -> TokenStream {
     }
 }
 
+/// Whether an output is an array: what is stored may be one number, and is one all the same.
+fn is_array(role: Output, len: usize) -> bool {
+    len > 1 || role == Output::State
+}
+
 fn body(kernel: &ValidKernel, needs_margin: bool) -> TokenStream {
     let names = value_names(kernel);
     let lets = statements(kernel, &names, false);
@@ -414,9 +488,9 @@ fn body(kernel: &ValidKernel, needs_margin: bool) -> TokenStream {
         .ir()
         .outputs
         .iter()
-        .map(|(_, ids)| {
+        .map(|(role, ids)| {
             let values = ids.iter().map(|v| &names[v.index()]);
-            if ids.len() == 1 { quote!(#(#values)*) } else { quote!([#(#values),*]) }
+            if is_array(*role, ids.len()) { quote!([#(#values),*]) } else { quote!(#(#values)*) }
         })
         .collect();
     if needs_margin {
@@ -450,10 +524,22 @@ fn statements(kernel: &ValidKernel, names: &[TokenStream], host: bool) -> Vec<To
         let values = v.iter().map(|v| at(*v));
         if host { quote!(<R as Real>::#method(#(#values),*)) } else { quote!(R::#method(#(#values),*)) }
     };
+    // The host's constants are of a type that has no such instruction.
+    let absorbed = if host { vec![None; names.len()] } else { absorbed_products(kernel) };
+    let negative = |v: &TokenStream| quote!(-#v);
     let mut lets = Vec::new();
     for (i, d) in kernel.ir().values.iter().enumerate() {
+        let product = |v: ValueId| match (absorbed[v.index()] == Some(i), kernel.ir().values[v.index()].op) {
+            (true, Op::Mul(x, y)) => Some((at(x), at(y))),
+            _ => None,
+        };
         let value = match d.op {
             Op::Input(..) => continue,
+            Op::Mul(..) if absorbed[i].is_some() => continue,
+            Op::Add(a, b) if let Some((x, y)) = product(a) => fused(x, y, at(b)),
+            Op::Add(a, b) if let Some((x, y)) = product(b) => fused(x, y, at(a)),
+            Op::Sub(a, b) if let Some((x, y)) = product(b) => fused(&negative(x), y, at(a)),
+            Op::Sub(a, b) if let Some((x, y)) = product(a) => fused(x, y, &negative(at(b))),
             Op::Const(q) if host && !q.is_integer() => {
                 let [n, d] = [q.numer(), q.denom()].map(|x| float(Rational::from_integer(*x)));
                 quote!(R::from_f64(#n) / R::from_f64(#d))
@@ -485,6 +571,32 @@ fn statements(kernel: &ValidKernel, names: &[TokenStream], host: bool) -> Vec<To
         lets.push(quote!(let #name = #value;));
     }
     lets
+}
+
+/// The sum or difference into which each product goes that is read nowhere else: one operation, where a machine has it.
+fn absorbed_products(kernel: &ValidKernel) -> Vec<Option<usize>> {
+    let values = &kernel.ir().values;
+    let mut uses = vec![0_usize; values.len()];
+    let operands = values.iter().flat_map(|d| d.op.operands());
+    let outputs = kernel.ir().outputs.iter().flat_map(|(_, ids)| ids.iter().copied());
+    operands.chain(outputs).for_each(|v| uses[v.index()] += 1);
+    let mut absorbed = vec![None; values.len()];
+    for (i, d) in values.iter().enumerate() {
+        let is_product = |v: &ValueId| uses[v.index()] == 1 && matches!(values[v.index()].op, Op::Mul(..));
+        let taken = match d.op {
+            Op::Add(a, b) => [a, b].into_iter().find(is_product),
+            Op::Sub(a, b) => [b, a].into_iter().find(is_product),
+            _ => None,
+        };
+        if let Some(v) = taken {
+            absorbed[v.index()] = Some(i);
+        }
+    }
+    absorbed
+}
+
+fn fused(x: &TokenStream, y: &TokenStream, c: &TokenStream) -> TokenStream {
+    quote!(R::multiply_add(#x, #y, #c))
 }
 
 fn binary(a: &TokenStream, op: TokenStream, b: &TokenStream) -> TokenStream {

@@ -280,6 +280,17 @@ impl Mesh {
         self.groups.faces.keys().map(String::as_str)
     }
 
+    /// The sum of each element's nodes' positions from the least corner of the mesh, m: an order by them does not depend on
+    /// where the mesh is.
+    pub fn centres(&self) -> Vec<[f64; 3]> {
+        let [low, _] = self.bounding_box();
+        let sum = |e| {
+            let positions = self.element_nodes(e).iter().map(|node| self.nodes[node.index()]);
+            positions.fold([0.0; 3], |sum, x| std::array::from_fn(|i| sum[i] + (x[i] - low[i])))
+        };
+        self.elements().map(sum).collect()
+    }
+
     /// The rest positions of some nodes, m.
     pub fn positions(&self, nodes: &[NodeId]) -> Vec<[f64; 3]> {
         nodes.iter().map(|node| self.nodes[node.index()]).collect()

@@ -8,6 +8,7 @@ use super::parameters::{self, Values};
 use super::place::Places;
 use crate::body::LawBatch;
 use crate::mesh::{ElementId, Mesh};
+use crate::order::{cluster_size, compact};
 use crate::scale::Scale;
 use crate::scene::{Scene, SceneError};
 
@@ -143,6 +144,7 @@ impl Assignment {
             by_law.entry(entry.report.law.info.name).or_default().push(i);
         }
         let mut batches = vec![];
+        let centres = mesh.centres();
         for materials in by_law.into_values() {
             let mut elements: Vec<u32> =
                 materials.iter().flat_map(|&m| self.entries[m].members.iter().copied()).collect();
@@ -150,7 +152,12 @@ impl Assignment {
             let kind = |e: &u32| mesh.kind(ElementId(*e));
             // The elements of a block have ascending numbers.
             let kinds = elements.chunk_by(|a, b| std::ptr::eq(kind(a), kind(b)));
-            batches.extend(kinds.map(|of_kind| self.batch(&materials, of_kind.to_vec(), kind(&of_kind[0]), scale)));
+            batches.extend(kinds.map(|of_kind| {
+                let (mut elements, kind) = (of_kind.to_vec(), kind(&of_kind[0]));
+                let size = cluster_size(kind.info.nodes, elements.len());
+                compact(&mut elements, &centres, size);
+                self.batch(&materials, elements, kind, scale)
+            }));
         }
         batches
     }

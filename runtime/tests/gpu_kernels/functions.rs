@@ -32,7 +32,9 @@ fn law(function: &str) -> &'static LawEntry {
     let functions = LawFunctions { banner: "", energy, force, dforce, diagonal, cauchy };
     let mut info = like.info.clone();
     (info.name, info.constants, info.domain) = (leaked(function.to_string()), &["a", "b"], None);
-    Box::leak(Box::new(LawEntry { info: Box::leak(Box::new(info)), functions: Box::leak(Box::new(functions)), ..like }))
+    let mut entry = like;
+    (entry.info, entry.functions) = (Box::leak(Box::new(info)), Box::leak(Box::new(functions)));
+    Box::leak(Box::new(entry))
 }
 
 /// Evaluates a function of pairs on the device.

@@ -144,7 +144,7 @@ pub fn solve(element: &'static ElementEntry, law: &'static LawEntry, cells: usiz
     let mesh = unit(element, cells);
     let chosen = Chosen { plane: element.info.dimension == 2 };
     let given = parameters(law);
-    let points = Points { kernels: (law.point_f64)(), constants: law.constants(&given) };
+    let points = Points { kernels: law.points(), constants: law.constants(&given) };
     let surface = mesh.surface_nodes();
     let imposed: Vec<(u32, u8, f64)> = (0..mesh.nodes().len() as u32)
         .flat_map(|n| (0..3).map(move |c| (n, c)))

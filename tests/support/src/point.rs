@@ -1,124 +1,114 @@
-//! A law at a material point: its compiled kernels on a one-element batch, with the rounding bound of its derivation.
+//! A law at a material point: its compiled kernels, with the rounding bound of its derivation.
 
 use tensormass_codegen::derivation::Derivation;
 use tensormass_codegen::ir::{Input, Op, Output, ValidKernel};
-use tensormass_kernels::RestPoint;
-use tensormass_kernels::batch::Batch;
-use tensormass_kernels::{BatchKernels, DampingKernels, LawEntry, Real};
+use tensormass_kernels::point::{DampingPointKernels, Material, PointKernels};
+use tensormass_kernels::{LawEntry, Precision};
 
 use crate::random::Rng;
 use crate::rounding::Rounded;
 use crate::tensor::{self, Matrix};
 
-/// The gradient of each node's interpolation function on the tetrahedron that [`Compiled`] uses.
+/// Gradients of nodes' interpolation functions for diagonals: those of the reference tetrahedron.
 pub const NODE_GRADIENTS: [[f64; 3]; 4] = [[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// Compiled kernels of one material on the reference tetrahedron with volume 1. Its gradients are the unit vectors, so
-/// that displacements u_0 = 0, u_j = column j of G realise G exactly, and P is minus the forces, exactly; only the sign
-/// of a zero is lost in the element's sums.
+/// Compiled kernels of one material at one point.
 #[derive(Debug)]
-pub struct Compiled<R: Real> {
-    kernels: BatchKernels<R>,
-    damping: Option<DampingKernels<R>>,
+pub struct Compiled<R: Precision> {
+    kernels: PointKernels<R>,
+    damping: Option<DampingPointKernels<R>>,
     constants: Vec<R>,
 }
 
-impl<R: Real> Compiled<R> {
-    /// Kernels with these constants, rounded to the working precision.
-    pub fn new(kernels: BatchKernels<R>, constants: &[f64]) -> Self {
-        Self { kernels, damping: None, constants: constants.iter().map(|&c| R::from_f64(c)).collect() }
+impl<R: Precision> Compiled<R> {
+    /// Kernels of a law with these constants, rounded to the working precision.
+    pub fn new(law: &LawEntry, constants: &[f64]) -> Self {
+        let constants = constants.iter().map(|&c| R::from_f64(c)).collect();
+        Self { kernels: law.points(), damping: law.damping_points(), constants }
     }
 
-    /// The same with the kernels of the law's damping, if it has a dissipation.
-    pub fn with_damping(self, damping: Option<DampingKernels<R>>) -> Self {
-        Self { damping, ..self }
+    fn material(&self) -> Material<'_, R> {
+        Material { constants: &self.constants, stride: 0, count: self.constants.len(), points: 1 }
     }
 
-    fn on_batch<T>(&self, f: impl FnOnce(&BatchKernels<R>, &Batch<R>) -> T) -> T {
-        let unit = |k: usize| R::from_f64(if k.is_multiple_of(4) { 1.0 } else { 0.0 });
-        let rest = [RestPoint { inverse_jacobian: std::array::from_fn(unit), weight: R::from_f64(1.0) }];
-        let count = self.constants.len();
-        f(&self.kernels, &Batch { nodes: &[[0, 1, 2, 3]], rest: &rest, constants: &self.constants, stride: 0, count })
+    fn zero() -> R {
+        R::from_f64(0.0)
     }
 
-    fn displacements(g: &[R; 9]) -> [[R; 3]; 4] {
-        std::array::from_fn(|n| std::array::from_fn(|i| if n == 0 { R::from_f64(0.0) } else { g[3 * i + n - 1] }))
-    }
-
-    fn zeros() -> [[[R; 3]; 4]; 1] {
-        [[[R::from_f64(0.0); 3]; 4]]
-    }
-
-    fn stress(forces: &[[R; 3]; 4]) -> [R; 9] {
-        std::array::from_fn(|k| -forces[1 + k % 3][k / 3])
+    fn node_gradients() -> [[R; 3]; 4] {
+        NODE_GRADIENTS.map(|g| g.map(R::from_f64))
     }
 
     /// W, and whether G is outside the domain.
     pub fn energy(&self, g: &[R; 9]) -> (R, bool) {
-        let mut w = [R::from_f64(0.0)];
-        let outside = self.on_batch(|k, b| (k.energy)(b, &Self::displacements(g), &mut w));
+        let mut w = [Self::zero()];
+        let outside = (self.kernels.energy)(&self.material(), &[*g], &mut w);
         (w[0], outside.is_some())
     }
 
     /// P, and whether G is outside the domain.
     pub fn force(&self, g: &[R; 9]) -> ([R; 9], bool) {
-        let mut f = Self::zeros();
-        let outside = self.on_batch(|k, b| (k.force)(b, &Self::displacements(g), &mut f));
-        (Self::stress(&f[0]), outside.is_some())
+        let mut p = [[Self::zero(); 9]];
+        let outside = (self.kernels.force)(&self.material(), &[*g], &mut p);
+        (p[0], outside.is_some())
     }
 
     /// dP in the direction dG.
     pub fn dforce(&self, g: &[R; 9], dg: &[R; 9]) -> [R; 9] {
-        let mut f = Self::zeros();
-        self.on_batch(|k, b| (k.dforce)(b, &Self::displacements(g), &Self::displacements(dg), &mut f));
-        Self::stress(&f[0])
+        let mut p = [[Self::zero(); 9]];
+        (self.kernels.dforce)(&self.material(), &[*g], &[*dg], &mut p);
+        p[0]
     }
 
     /// The tangent's diagonal for each of [`NODE_GRADIENTS`].
     pub fn diagonal(&self, g: &[R; 9]) -> [[R; 3]; 4] {
-        let mut d = Self::zeros();
-        self.on_batch(|k, b| (k.diagonal)(b, &Self::displacements(g), &mut d));
-        d[0]
+        let mut d = Self::node_gradients();
+        (self.kernels.diagonal)(&self.material(), &[*g], &mut d);
+        d
     }
 
     /// The Cauchy stress.
     pub fn cauchy(&self, g: &[R; 9]) -> [R; 9] {
-        let mut s = [[R::from_f64(0.0); 9]];
-        self.on_batch(|k, b| (k.cauchy)(b, &Self::displacements(g), &mut s));
+        let mut s = [[Self::zero(); 9]];
+        (self.kernels.cauchy)(&self.material(), &[*g], &mut s);
         s[0]
     }
 
-    fn damping_kernels(&self) -> &DampingKernels<R> {
+    /// Whether the law has a dissipation.
+    pub fn is_dissipative(&self) -> bool {
+        self.damping.is_some()
+    }
+
+    fn damping_kernels(&self) -> &DampingPointKernels<R> {
         self.damping.as_ref().expect("the law has a dissipation")
     }
 
     /// D at G and its rate, of a law with a dissipation.
     pub fn dissipation(&self, g: &[R; 9], rate: &[R; 9]) -> R {
-        let (u, v, mut d) = (Self::displacements(g), Self::displacements(rate), [R::from_f64(0.0)]);
-        self.on_batch(|_, b| (self.damping_kernels().dissipation)(b, &u, &v, &mut d));
+        let mut d = [Self::zero()];
+        (self.damping_kernels().dissipation)(&self.material(), &[*g], &[*rate], &mut d);
         d[0]
     }
 
     /// P_v at G and its rate.
     pub fn damping(&self, g: &[R; 9], rate: &[R; 9]) -> [R; 9] {
-        let (u, v, mut f) = (Self::displacements(g), Self::displacements(rate), Self::zeros());
-        self.on_batch(|_, b| (self.damping_kernels().damping)(b, &u, &v, &mut f));
-        Self::stress(&f[0])
+        let mut p = [[Self::zero(); 9]];
+        (self.damping_kernels().damping)(&self.material(), &[*g], &[*rate], &mut p);
+        p[0]
     }
 
     /// dP_v at G and its rate, where the rate changes by dG.
     pub fn ddamping(&self, g: &[R; 9], rate: &[R; 9], dg: &[R; 9]) -> [R; 9] {
-        let (u, v, dv) = (Self::displacements(g), Self::displacements(rate), Self::displacements(dg));
-        let mut f = Self::zeros();
-        self.on_batch(|_, b| (self.damping_kernels().ddamping)(b, &u, &v, &dv, &mut f));
-        Self::stress(&f[0])
+        let mut p = [[Self::zero(); 9]];
+        (self.damping_kernels().ddamping)(&self.material(), &[*g], &[*rate], &[*dg], &mut p);
+        p[0]
     }
 
     /// The diagonal of dP_v for each of [`NODE_GRADIENTS`].
     pub fn damping_diagonal(&self, g: &[R; 9], rate: &[R; 9]) -> [[R; 3]; 4] {
-        let (u, v, mut d) = (Self::displacements(g), Self::displacements(rate), Self::zeros());
-        self.on_batch(|_, b| (self.damping_kernels().diagonal)(b, &u, &v, &mut d));
-        d[0]
+        let mut d = Self::node_gradients();
+        (self.damping_kernels().diagonal)(&self.material(), &[*g], &[*rate], &mut d);
+        d
     }
 }
 
@@ -180,8 +170,7 @@ impl Point {
         // In f32 the constants are rounded once more.
         let bounds = material.expect("one value a parameter component").remove(0).into_iter();
         let constants = bounds.zip(&values).map(|(b, &v)| Rounded::new(v, b.error + v.abs())).collect::<Vec<_>>();
-        let double = Compiled::new((entry.f64)(), &values).with_damping(entry.damping.map(|d| (d.f64)()));
-        let single = Compiled::new((entry.f32)(), &values).with_damping(entry.damping.map(|d| (d.f32)()));
+        let (double, single) = (Compiled::new(entry, &values), Compiled::new(entry, &values));
         let comparisons = comparisons(&derivation);
         Self { entry, derivation, parameters, rounded, double, single, constants, comparisons }
     }

@@ -91,6 +91,7 @@ pub fn field(role: Output) -> &'static str {
         Output::EnergyDensity => "w",
         Output::Stress => "p",
         Output::StressIncrement => "dp",
+        Output::State => "state",
         Output::Diagonal => "d",
         Output::Cauchy => "sigma",
         Output::DissipationDensity => "d",
@@ -148,7 +149,7 @@ fn is_number(role: Output) -> bool {
     match role {
         Output::EnergyDensity | Output::DissipationDensity | Output::DomainMargin | Output::NearRest => true,
         Output::Constants | Output::Stress | Output::StressIncrement | Output::Diagonal | Output::Cauchy => false,
-        Output::DisplacementGradient | Output::NodalForce | Output::NodeGradients => false,
+        Output::State | Output::DisplacementGradient | Output::NodalForce | Output::NodeGradients => false,
     }
 }
 

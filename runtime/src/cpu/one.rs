@@ -1,0 +1,62 @@
+//! A law on one element, in double precision: what step limits and tests ask of it.
+
+use tensormass_kernels::{Blocks, Cluster, Compute, ElementEntry, Engine, LawEntry, Node, RestPoint, compose};
+
+/// One element with its kernels; vectors are given at its nodes.
+pub struct One {
+    compute: Box<dyn Compute<f64>>,
+    blocks: Blocks<f64>,
+}
+
+fn padded(u: &[[f64; 3]]) -> Vec<Node<f64>> {
+    u.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect()
+}
+
+impl One {
+    /// A law on an element with these points at rest and constants.
+    ///
+    /// # Panics
+    /// They are not those of the element or the law.
+    pub fn new(element: &ElementEntry, law: &LawEntry, rest: &[RestPoint<f64>], constants: &[f64]) -> Self {
+        let nodes: Vec<u32> = (0..element.info.nodes as u32).collect();
+        let compute = compose::<f64>(Engine::SCALAR, element, law);
+        let shape = [element.info.nodes, element.info.points.len(), law.info.constants.len()];
+        let cluster = Cluster { nodes: &nodes, rest, constants, per_element: false };
+        Self { blocks: Blocks::new(compute.lanes(), shape, &cluster), compute }
+    }
+
+    /// What is added to zeros at the nodes.
+    fn nodal<T>(&self, out: &mut [[f64; 3]], add: impl FnOnce(&mut [Node<f64>]) -> T) -> T {
+        let mut nodes = vec![[0.0; 4]; out.len()];
+        let result = add(&mut nodes);
+        out.iter_mut().zip(nodes).for_each(|(out, [x, y, z, _])| *out = [x, y, z]);
+        result
+    }
+
+    /// The strain energy, where the element is inside the law's domain.
+    pub fn energy(&self, u: &[[f64; 3]]) -> Option<f64> {
+        let mut energy = [0.0];
+        let outside = self.compute.energy(&self.blocks, &padded(u), &mut energy);
+        outside.is_none().then_some(energy[0])
+    }
+
+    /// Nodal forces; whether the element is inside the law's domain.
+    pub fn force(&self, u: &[[f64; 3]], out: &mut [[f64; 3]]) -> bool {
+        self.nodal(out, |f| self.compute.force(&self.blocks, &padded(u), f).is_none())
+    }
+
+    /// Their differentials where u changes by du.
+    pub fn dforce(&self, u: &[[f64; 3]], du: &[[f64; 3]], out: &mut [[f64; 3]]) {
+        self.nodal(out, |f| self.compute.dforce(&self.blocks, [&padded(u), &padded(du)], f));
+    }
+
+    /// The diagonal of the tangent stiffness.
+    pub fn diagonal(&self, u: &[[f64; 3]], out: &mut [[f64; 3]]) {
+        self.nodal(out, |f| self.compute.diagonal(&self.blocks, &padded(u), f));
+    }
+
+    /// The differentials of damping forces where v changes by dv.
+    pub fn ddamping(&self, [u, v, dv]: [&[[f64; 3]]; 3], out: &mut [[f64; 3]]) {
+        self.nodal(out, |f| self.compute.ddamping(&self.blocks, [&padded(u), &padded(v), &padded(dv)], f));
+    }
+}
