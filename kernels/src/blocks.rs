@@ -46,14 +46,25 @@ impl<R: Copy + Default> States<R> {
         Self(Aligned::new(&vec![R::default(); count], R::default()))
     }
 
-    /// Those of a range of blocks, `each` numbers a block.
-    pub(crate) fn of(&self, first: usize, count: usize, each: usize) -> &[R] {
-        &self.0.from(first * each)[..count * each]
+    /// Those of the blocks from one on, `each` numbers a block.
+    pub(crate) fn of(&self, first: usize, each: usize) -> &[R] {
+        self.0.from(first * each)
     }
 
     pub(crate) fn of_mut(&mut self, first: usize, count: usize, each: usize) -> &mut [R] {
         let start = self.0.start + first * each;
         &mut self.0.numbers[start..][..count * each]
+    }
+}
+
+/// Asks for the cache lines of some numbers.
+#[inline(always)]
+pub(crate) fn prefetch<T>(numbers: &[T]) {
+    #[cfg(target_arch = "x86_64")]
+    for line in numbers.chunks((LINE / size_of::<T>()).max(1)) {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: every x86-64 machine has it, and it reads nothing.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(line.as_ptr().cast()) };
     }
 }
 
@@ -193,6 +204,18 @@ impl<R> Blocks<R> {
 }
 
 impl<R: Copy> Blocks<R> {
+    /// Asks for what a block has at rest before it is read: it comes from an outer cache or from memory, while others are
+    /// computed.
+    #[inline(always)]
+    pub(crate) fn prefetch(&self, block: usize) {
+        let each = 10 * self.points * self.lanes;
+        let start = (self.rest.start + block * each).min(self.rest.numbers.len());
+        let end = (start + each).min(self.rest.numbers.len());
+        prefetch(&self.rest.numbers[start..end]);
+        let (places, each) = (&self.places, self.nodes * self.lanes);
+        prefetch(&places[(block * each).min(places.len())..((block + 1) * each).min(places.len())]);
+    }
+
     /// J^-1 at a quadrature point of each element of a block, and the weight.
     #[inline(always)]
     pub(crate) fn rest<V: Lanes<Scalar = R>>(&self, block: usize, q: usize) -> ([V; 9], V) {

@@ -241,7 +241,7 @@ impl<V: Tabled> Compute<V::Scalar> for Composed<V> {
         self.groups(blocks, |before, elements, material| {
             let points = elements.count * material.points;
             (self.element.gradient)(&elements, du, &mut dg);
-            let states = states.of(before / V::COUNT, elements.count, self.of_block());
+            let states = states.of(before / V::COUNT, self.of_block());
             (self.law.apply)(&material, states, &dg[..points], &mut stress[..points]);
             (self.element.contract)(&elements, &stress, df);
         });

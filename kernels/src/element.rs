@@ -231,6 +231,7 @@ pub(crate) fn gradient<E: Element, V: Lanes>(elements: &Elements<V>, u: &[Node<V
     let points = E::info().points.len();
     let Elements { blocks, first, count, table } = *elements;
     for block in 0..count {
+        blocks.prefetch(first + count + block);
         let mut nodal = E::nodal();
         for (node, vector) in nodal.as_mut().iter_mut().enumerate() {
             *vector = blocks.gather(u, first + block, node);

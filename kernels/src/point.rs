@@ -1,5 +1,6 @@
 //! A law's point kernels over a range of quadrature points, whatever element these are of.
 
+use crate::blocks::prefetch;
 use crate::damping::Dissipative;
 use crate::lanes::Lanes;
 use crate::law::Law;
@@ -135,14 +136,18 @@ pub(crate) fn linearize<L: Law, V: Lanes>(material: &Material<V>, g: &[[V; 9]], 
 
 #[inline(always)]
 pub(crate) fn apply<L: Law, V: Lanes>(material: &Material<V>, states: &[V::Scalar], dg: &[[V; 9]], out: &mut [[V; 9]]) {
-    for (q, (dg, out)) in dg.iter().zip(out).enumerate() {
+    for (q, (increment, out)) in dg.iter().zip(out).enumerate() {
         let mut state = L::state::<V>();
         let stored = state.as_ref().len();
-        let here = &states[q * stored * V::COUNT..][..stored * V::COUNT];
+        let each = stored * V::COUNT;
+        let here = &states[q * each..][..each];
+        // What the next group of points will read.
+        let next = ((q + dg.len()) * each).min(states.len());
+        prefetch(&states[next..(next + each).min(states.len())]);
         for k in 0..stored {
             state.as_mut()[k] = V::load(&here[k * V::COUNT..]);
         }
-        *out = L::apply(material.at(q), &state, dg);
+        *out = L::apply(material.at(q), &state, increment);
     }
 }
 

@@ -133,6 +133,18 @@ pub trait Backend {
     fn descend(&self, descent: Descent<Self>, registers: &mut Self::Registers)
     where
         Self: Sized;
+    /// One update of an explicit integrator: v = keep v + kick M^-1 f, then u += drift v. What was in `acceleration` is
+    /// lost.
+    fn advance(&self, advance: Advance<Self>)
+    where
+        Self: Sized,
+    {
+        let Advance { force, masses, acceleration, keep, kick, drift, v, u } = advance;
+        self.divide(force, masses, acceleration);
+        self.scale(keep, v);
+        self.axpy(kick, acceleration, v);
+        self.axpy(drift, v, u);
+    }
     /// The next direction of a conjugate gradient: d = z + b d with b = [`BETA`].
     fn turn(&self, z: &Self::Vector, d: &mut Self::Vector, registers: &Self::Registers);
     /// How many iterations a solver does well to take between two readings of its registers.
@@ -152,6 +164,26 @@ pub trait Backend {
     /// # Errors
     /// The first fault of the device.
     fn check(&self) -> Result<(), DeviceError>;
+}
+
+/// The vectors and factors of [`Backend::advance`].
+pub struct Advance<'a, B: Backend> {
+    /// Forces.
+    pub force: &'a B::Vector,
+    /// Lumped masses.
+    pub masses: &'a B::Vector,
+    /// Room for accelerations.
+    pub acceleration: &'a mut B::Vector,
+    /// What is kept of the velocity.
+    pub keep: f64,
+    /// The factor of the acceleration.
+    pub kick: f64,
+    /// The factor of the velocity.
+    pub drift: f64,
+    /// Velocity.
+    pub v: &'a mut B::Vector,
+    /// Displacement.
+    pub u: &'a mut B::Vector,
 }
 
 /// The vectors of [`Backend::descend`].

@@ -83,7 +83,7 @@ impl Plan {
             .batches
             .iter()
             .map(|b| {
-                let mut law = law(b, implicit, proportional);
+                let mut law = law(b, layout, implicit, proportional);
                 let damping = damping_kernels(b.law, b.element.info);
                 law.kernels.extend(damping.filter(|(name, _)| viscous && (implicit || *name == "damping")));
                 law
@@ -145,6 +145,9 @@ impl Plan {
             passes.push("elements: partial force differentials of the velocity, nodes: sum of slots");
         }
         if implicit {
+            if layout == Layout::Cpu && model.body.batches.iter().any(|b| b.law.info.stored > 0) {
+                passes.push("elements: what is stored of the tangent");
+            }
             passes.push("elements: diagonal");
             if viscous {
                 passes.push("elements: diagonal of damping, nodes: sum of slots");
@@ -241,17 +244,20 @@ fn damping_kernels(law: &LawEntry, element: &'static ElementInfo) -> impl Iterat
     kernels.into_iter().filter(move |_| linear.is_some())
 }
 
-fn law(batch: &LawBatch, implicit: bool, proportional: bool) -> PlannedLaw {
+fn law(batch: &LawBatch, layout: Layout, implicit: bool, proportional: bool) -> PlannedLaw {
     let (info, element) = (batch.law.info, batch.element.info);
     let point = |name: &str| point_operations(info, name);
     let gathers = if info.structure.linear { 1 } else { 2 };
     let mut kernels = vec![("force", operations(element, 1, point("force") + element.contract_operations))];
-    if implicit {
-        // Of an element's tangent what does not depend on the increment is stored.
+    // On a CPU what does not depend on the increment is computed once, and stored if it is anything.
+    let stores = implicit && layout == Layout::Cpu;
+    if stores && info.stored > 0 {
         kernels.push(("linearize", operations(element, 1, point("linearize"))));
+    }
+    if stores {
         kernels.push(("apply", operations(element, 1, tangent_operations(info) + element.contract_operations)));
     }
-    if implicit || proportional {
+    if (implicit && !stores) || proportional {
         kernels.push(("dforce", operations(element, gathers, point("dforce") + element.contract_operations)));
     }
     if implicit {

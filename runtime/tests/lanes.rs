@@ -46,23 +46,27 @@ impl Case {
         let mut field = CpuField::<R>::on(&self.body, engine);
         let [u, v, du] = self.vectors.each_ref().map(|x| backend.upload(x));
         let mut all = vec![];
-        let mut nodal = |name, add: &mut dyn FnMut(&mut CpuField<R>, &mut Vec<[R; 3]>) -> Result<(), LeftDomain>| {
-            let mut out = backend.zeros();
-            add(&mut field, &mut out)?;
-            all.push((name, backend.download(&out).as_flattened().to_vec()));
-            Ok::<(), LeftDomain>(())
+        let kept = |out: &mut Vec<[R; 3]>| {
+            let values = backend.download(out).as_flattened().to_vec();
+            backend.clear(out);
+            values
         };
-        nodal("force", &mut |field, out| field.add_force(&backend, &u, out))?;
-        nodal("dforce", &mut |field, out| Ok(field.add_dforce_at(&backend, &u, &du, 1.0, out)))?;
-        nodal("apply", &mut |field, out| {
-            field.prepare(&backend, &u);
-            field.add_dforce(&backend, &du, 1.0, out);
-            Ok(())
-        })?;
-        nodal("diagonal", &mut |field, out| Ok(field.add_diagonal_at(&backend, &u, 1.0, out)))?;
-        nodal("damping", &mut |field, out| Ok(field.add_damping(&backend, [&u, &v], 1.0, out)))?;
-        nodal("ddamping", &mut |field, out| Ok(field.add_ddamping(&backend, [&u, &v], &du, 1.0, out)))?;
-        nodal("damping_diagonal", &mut |field, out| Ok(field.add_damping_diagonal(&backend, [&u, &v], 1.0, out)))?;
+        let mut out = backend.zeros();
+        field.add_force(&backend, &u, &mut out)?;
+        all.push(("force", kept(&mut out)));
+        field.add_dforce_at(&backend, &u, &du, 1.0, &mut out);
+        all.push(("dforce", kept(&mut out)));
+        field.prepare(&backend, &u);
+        field.add_dforce(&backend, &du, 1.0, &mut out);
+        all.push(("apply", kept(&mut out)));
+        field.add_diagonal_at(&backend, &u, 1.0, &mut out);
+        all.push(("diagonal", kept(&mut out)));
+        field.add_damping(&backend, [&u, &v], 1.0, &mut out);
+        all.push(("damping", kept(&mut out)));
+        field.add_ddamping(&backend, [&u, &v], &du, 1.0, &mut out);
+        all.push(("ddamping", kept(&mut out)));
+        field.add_damping_diagonal(&backend, [&u, &v], 1.0, &mut out);
+        all.push(("damping_diagonal", kept(&mut out)));
         all.push(("energy", field.element_energies(&backend, &u)?));
         all.push(("cauchy", field.cauchy(&backend, &u).as_flattened().to_vec()));
         Ok(all)

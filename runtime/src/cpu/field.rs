@@ -30,10 +30,11 @@ impl<R: Precision> CpuBatch<R> {
         let (count, size) = (batch.elements.len(), cluster_size(batch.element.info.nodes, batch.elements.len()));
         let ranges: Vec<usize> = (0..count).step_by(size).collect();
         let cluster = |start: &usize| Cluster::new(body, batch, *start..count.min(start + size), &*compute);
+        // One after the other: what is computed in turn lies in turn in memory, as far as the allocator has it.
         Self {
             law: batch.law.info.name,
             domain: batch.law.info.domain.unwrap_or("everywhere"),
-            clusters: ranges.par_iter().map(cluster).collect(),
+            clusters: ranges.iter().map(cluster).collect(),
             compute,
         }
     }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::Precision;
-use crate::backend::{ALPHA, BETA, Backend, Counts, Descent, REGISTERS, RUNNING, SUM, Update};
+use crate::backend::{ALPHA, Advance, BETA, Backend, Counts, Descent, REGISTERS, RUNNING, SUM, Update};
 use crate::body::Constraint;
 use crate::device::DeviceError;
 use crate::mass::MassMatrix;
@@ -245,6 +245,21 @@ impl<R: Precision> Backend for CpuBackend<R> {
                 .collect();
             registers[SUM] = blocks.iter().sum();
         }
+    }
+
+    fn advance(&self, advance: Advance<Self>) {
+        let Advance { force, masses, keep, kick, drift, v, u, .. } = advance;
+        let [keep, kick, drift] = [keep, kick, drift].map(R::from_f64);
+        let given = force.par_chunks(BLOCK).zip(masses.par_chunks(BLOCK));
+        // One pass over the vectors, with the arithmetic of the four operations.
+        v.par_chunks_mut(BLOCK).zip(u.par_chunks_mut(BLOCK)).zip(given).for_each(|((v, u), (force, masses))| {
+            for i in 0..v.len() {
+                for c in 0..3 {
+                    v[i][c] = keep * v[i][c] + kick * (force[i][c] / masses[i][c]);
+                    u[i][c] = u[i][c] + drift * v[i][c];
+                }
+            }
+        });
     }
 
     fn turn(&self, z: &Self::Vector, d: &mut Self::Vector, registers: &Self::Registers) {

@@ -3,7 +3,7 @@
 //! The elements' damping forces are those of the last velocity that is known, before the step or half a step before: the
 //! schemes stay explicit, and are of first order in these forces.
 
-use crate::backend::{Backend, ForceField};
+use crate::backend::{Advance, Backend, ForceField};
 use crate::system::{Integrator, SolveError, State, StepReport, System};
 
 /// Sets imposed components to their values at a time, and their velocity to the mean over the last h.
@@ -31,12 +31,17 @@ impl<B: Backend, F: ForceField<B>> Integrator<B, F> for SemiImplicitEuler<B> {
     fn step(&mut self, system: &mut System<B, F>, state: &mut State<B>, h: f64) -> Result<StepReport, SolveError> {
         system.force(&state.u, state.time, &mut self.force)?;
         system.add_damping(&state.u, &state.v, &mut self.force);
-        let backend = &system.backend;
-        backend.divide(&self.force, system.masses.diagonal(), &mut self.acceleration);
-        // Damping -alpha M V at the beginning of the step.
-        backend.scale(1.0 - h * system.body.mass_damping, &mut state.v);
-        backend.axpy(h, &self.acceleration, &mut state.v);
-        backend.axpy(h, &state.v, &mut state.u);
+        system.backend.advance(Advance {
+            force: &self.force,
+            masses: system.masses.diagonal(),
+            acceleration: &mut self.acceleration,
+            // Damping -alpha M V at the beginning of the step.
+            keep: 1.0 - h * system.body.mass_damping,
+            kick: h,
+            drift: h,
+            v: &mut state.v,
+            u: &mut state.u,
+        });
         impose(system, state, state.time + h, h);
         Ok(StepReport { forces: 1, ..StepReport::default() })
     }
@@ -73,17 +78,24 @@ impl<B: Backend, F: ForceField<B>> Integrator<B, F> for CentralDifference<B> {
         system.add_damping(&state.u, &state.v, &mut self.force);
         let alpha = system.body.mass_damping;
         let backend = &system.backend;
-        backend.divide(&self.force, system.masses.diagonal(), &mut self.acceleration);
         if !self.started {
+            backend.divide(&self.force, system.masses.diagonal(), &mut self.acceleration);
             // u(-h) = u_0 - h v_0 + h^2 a_0 / 2 with a_0 = M^-1 f - alpha v_0: the velocity half a step before the start.
             backend.scale(1.0 + 0.5 * h * alpha, &mut state.v);
             backend.axpy(-0.5 * h, &self.acceleration, &mut state.v);
             self.started = true;
         }
         let (gamma_1, _, gamma_3) = central_difference_coefficients(alpha, h);
-        backend.scale(-gamma_3, &mut state.v);
-        backend.axpy(gamma_1 / h, &self.acceleration, &mut state.v);
-        backend.axpy(h, &state.v, &mut state.u);
+        backend.advance(Advance {
+            force: &self.force,
+            masses: system.masses.diagonal(),
+            acceleration: &mut self.acceleration,
+            keep: -gamma_3,
+            kick: gamma_1 / h,
+            drift: h,
+            v: &mut state.v,
+            u: &mut state.u,
+        });
         impose(system, state, state.time + h, h);
         Ok(StepReport { forces: 1, ..StepReport::default() })
     }

@@ -8,11 +8,13 @@ use crate::table::Precision;
 
 type Function<R> = fn(R) -> R;
 
+type Case<R> = (&'static str, Function<R>, Function<Twofold>, (f64, f64), f64);
+
 /// Functions with what they are, the least and greatest argument, and the error allowed in units in the last place.
 ///
 /// The sums' leading terms are exact, what is added to them less than a half of them, with a few roundings: within one unit.
 /// exp(x) - 1 = 2 (exp(r) - 1) + 1 with r < 0 may be less than a half of what was rounded; remainders as documented.
-fn cases<R: Real>() -> Vec<(&'static str, Function<R>, Function<Twofold>, (f64, f64), f64)> {
+fn cases<R: Real>() -> Vec<Case<R>> {
     vec![
         ("ln", R::ln, Twofold::ln, (1e-30, 1e30), 1.0),
         ("ln near 1", R::ln, Twofold::ln, (0.6, 1.7), 1.0),
