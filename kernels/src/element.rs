@@ -30,7 +30,7 @@ pub struct ElementInfo {
     pub nodes: usize,
     /// Reference coordinates of the nodes.
     pub reference: &'static [[f64; 3]],
-    /// Whether the rows of J^-1 are the gradients of nodes 1, 2, 3: the fused kernels of [`crate::batch`] compute it.
+    /// Whether the rows of J^-1 are the gradients of nodes 1, 2, 3: it is the linear tetrahedron.
     pub is_linear_simplex: bool,
     /// The quadrature points.
     pub points: &'static [ReferencePoint],
