@@ -72,7 +72,7 @@ fn tangent(derivation: &Derivation) -> TokenStream {
             };
             let linearize = linearize.as_ref().map_or(none, |k| point_kernel(k, "linearize", false));
             let mut arguments = arguments(apply);
-            if linearize_is_empty(&tangent) {
+            if tangent.stored() == 0 {
                 arguments.insert(arguments.len() - 1, quote!(_state: &[R; 0]));
             }
             (linearize, function(apply, "apply", &arguments, false))
@@ -99,10 +99,6 @@ fn tangent(derivation: &Derivation) -> TokenStream {
         #linearize
         #apply
     }
-}
-
-fn linearize_is_empty(tangent: &Tangent) -> bool {
-    tangent.stored() == 0
 }
 
 /// The damping of a law with a dissipation.
