@@ -144,11 +144,14 @@ impl ValidKernel {
         let side = network.source_side(source, sink);
         let all = (0..values.len() as u32).map(ValueId);
         let stored: Vec<ValueId> = all.filter(|v| is_state(*v) && side[there(*v)] && !side[again(*v)]).collect();
-        Cut { linearize: (!stored.is_empty()).then(|| self.linearize(&stored)), apply: self.apply(&stored, increment) }
+        Cut {
+            linearize: (!stored.is_empty()).then(|| self.linearize(&stored, increment)),
+            apply: self.apply(&stored, increment),
+        }
     }
 
-    fn linearize(&self, stored: &[ValueId]) -> ValidKernel {
-        let inputs = self.ir().inputs.iter().filter(|(role, _)| *role != Input::GradientIncrement).copied();
+    fn linearize(&self, stored: &[ValueId], increment: Input) -> ValidKernel {
+        let inputs = self.ir().inputs.iter().filter(|(role, _)| *role != increment).copied();
         let kernel = KernelIr {
             name: "linearize".to_string(),
             inputs: inputs.collect(),
