@@ -14,8 +14,8 @@ fn kernels<R: Precision>(c: &mut Criterion, precision: &str) {
     for law in laws() {
         let model = beam(law, [100, 10, 10]);
         let nodes = model.mesh.nodes();
-        let backend = CpuBackend::<R>::new(nodes.len(), vec![]);
-        let mut field = CpuField::<R>::new(&model.body);
+        let backend = CpuBackend::<R>::new(&model.body);
+        let mut field = CpuField::<R>::new(&backend, &model.body);
         let u = backend.upload(&nodes.iter().map(wave).collect::<Vec<_>>());
         let mut f = backend.zeros();
         let mut group = c.benchmark_group(format!("{precision}/{}", law.info.name));

@@ -1,6 +1,6 @@
 //! What the benchmarks share; they are in `benches/`.
 
-use tensormass_runtime::measure::scene_text;
+use tensormass_runtime::measure::{Subject, scene_text};
 use tensormass_runtime::model::{Model, build};
 use tensormass_runtime::scene::{Precision, parse};
 use tensormass_runtime::{LawEntry, linear_tetrahedron};
@@ -11,8 +11,9 @@ pub use tensormass_runtime::measure::wave;
 ///
 /// # Panics
 /// Never: the scene is right.
-pub fn beam(law: &LawEntry, cells: [usize; 3]) -> Model {
-    let text = scene_text(law, linear_tetrahedron().info, cells, Precision::F64);
+pub fn beam(law: &'static LawEntry, cells: [usize; 3]) -> Model {
+    let (element, precision) = (linear_tetrahedron(), Precision::F64);
+    let text = scene_text(&Subject { law, element, cells, precision, repeats: 1, stiffness_ratio: 1.0 });
     let scene = parse(&text, "bench.toml", &[]).expect("the scene is right");
     build(&scene).expect("the scene can be built")
 }

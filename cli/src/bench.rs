@@ -1,11 +1,17 @@
 //! `tensormass bench`: how many elements a second kernels and steps compute on this machine.
 
 mod baseline;
+mod report;
+mod roofline;
+
+use std::io::Write;
 
 use clap::Args;
-use serde_json::{Value, json};
+use serde_json::json;
 use tensormass_runtime::device::DeviceChoice;
-use tensormass_runtime::measure::{self, Bench, MeasureError, Measured, Subject, Timing};
+#[cfg(feature = "gpu")]
+use tensormass_runtime::gpu::GpuOptions;
+use tensormass_runtime::measure::{self, Bench, MeasureError, Subject};
 use tensormass_runtime::plan::precision_name;
 use tensormass_runtime::scene::Precision;
 use tensormass_runtime::target::Target;
@@ -38,6 +44,21 @@ pub struct Arguments {
     /// Times that each operation is repeated.
     #[arg(long, value_name = "COUNT", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     repeats: u32,
+    /// Measure an implicit step too: with and without a preconditioner, and its parts.
+    #[arg(long, conflicts_with = "baseline")]
+    implicit: bool,
+    /// How many times stiffer the material is in one half of the beam than in the other.
+    #[arg(long, value_name = "RATIO", default_value_t = 1.0, value_parser = ratio)]
+    stiffness_ratio: f64,
+    /// Invocations of a GPU's work group, a power of two up to 256; others if given again [default: 64].
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=256))]
+    work_group: Vec<u32>,
+    /// Elements that one invocation on a GPU computes; others if given again [default: 1].
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    per_invocation: Vec<u32>,
+    /// A file for a picture: what was measured under the roofs of this machine's bandwidth and operations a second.
+    #[arg(long, value_name = "FILE.svg", conflicts_with = "baseline")]
+    roofline: Option<std::path::PathBuf>,
     /// CPU threads; 0 takes all cores.
     #[arg(long, value_name = "COUNT", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=1024))]
     threads: u32,
@@ -60,6 +81,11 @@ fn cells(text: &str) -> Result<[usize; 3], String> {
     cells.filter(|c| c.iter().product::<usize>() <= 10_000_000).ok_or_else(|| {
         "cells are three numbers from 1 to 10000, ten million cells at most, such as 20x10x10".to_string()
     })
+}
+
+fn ratio(text: &str) -> Result<f64, String> {
+    let ratio = text.parse().ok().filter(|r: &f64| (1e-9..=1e9).contains(r));
+    ratio.ok_or_else(|| "a ratio is a number from 1e-9 to 1e9".to_string())
 }
 
 fn precision(text: &str) -> Result<Precision, String> {
@@ -93,39 +119,110 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
     for &precision in &arguments.precision {
         let target = Target::open(&arguments.device, precision)
             .map_err(|e| Failure::bad_input(format!("--device {}: {e}", arguments.device)))?;
-        for &cells in &beams {
-            for &law in &chosen {
-                let repeats = arguments.repeats as usize;
-                subjects.push((target.clone(), Subject { law, element, cells, precision, repeats }));
+        for target in tuned(&target, arguments)? {
+            for &cells in &beams {
+                for &law in &chosen {
+                    let (repeats, stiffness_ratio) = (arguments.repeats as usize, arguments.stiffness_ratio);
+                    let subject = Subject { law, element, cells, precision, repeats, stiffness_ratio };
+                    subjects.push((target.clone(), subject));
+                }
             }
         }
     }
     if let Some(program) = &arguments.baseline {
         return baseline::compare(&bench, &subjects, program, arguments.rounds, arguments.json);
     }
+    // What cannot be written is said before anything is measured.
+    let mut picture = match &arguments.roofline {
+        Some(file) => Some(std::fs::File::create(file).map_err(|e| no_picture(file, &e))?),
+        None => None,
+    };
     let bandwidth = bench.triad();
+    let peaks: Vec<(Precision, f64)> = arguments.precision.iter().map(|&p| (p, bench.peak(p))).collect();
     if !arguments.json {
+        let of_precision =
+            |(p, peak): &(Precision, f64)| format!(", {:.0} Gflop/s in {}", peak / 1e9, precision_name(*p));
         text::print(&format!(
-            "memory triad {:.1} GB/s on {} threads; medians of {}; compare figures of one call only\n",
+            "memory triad {:.1} GB/s{} on {} threads; medians of {}; compare figures of one call only\n",
             bandwidth / 1e9,
+            peaks.iter().map(of_precision).collect::<String>(),
             bench.threads(),
             arguments.repeats
         ))?;
     }
-    let mut rows = vec![];
+    let (mut rows, mut dots) = (vec![], vec![]);
     for (target, subject) in &subjects {
         let measured = bench.measure(target, subject).map_err(failed)?;
+        let implicit = if arguments.implicit { Some(bench.implicit(target, subject).map_err(failed)?) } else { None };
+        dots.extend(roofline::dots(subject, &measured));
         if arguments.json {
-            rows.push(as_json(subject, &measured, &target.name(), bandwidth));
+            let mut row = report::as_json(subject, &measured, &name(target), bandwidth);
+            if let Some(implicit) = &implicit {
+                row["implicit_step"] = report::implicit_as_json(subject, implicit);
+            }
+            rows.push(row);
         } else {
-            text::print(&as_text(subject, &measured, &target.name(), bandwidth))?;
+            text::print(&report::as_text(subject, &measured, &name(target), bandwidth))?;
+            if let Some(implicit) = &implicit {
+                text::print(&report::implicit_as_text(subject, implicit))?;
+            }
         }
+    }
+    if let (Some(picture), Some(file)) = (&mut picture, &arguments.roofline) {
+        let drawn = roofline::picture(bandwidth, &peaks, &dots);
+        picture.write_all(drawn.as_bytes()).map_err(|e| no_picture(file, &e))?;
     }
     if arguments.json {
         let (triad, threads) = (bandwidth, bench.threads());
-        text::print_json(&json!({ "triad_bytes_per_s": triad, "threads": threads, "measured": rows }))?;
+        let of_precision = |(p, peak): &(Precision, f64)| (precision_name(*p).to_string(), json!(peak));
+        let peaks: serde_json::Map<_, _> = peaks.iter().map(of_precision).collect();
+        text::print_json(&json!({
+            "triad_bytes_per_s": triad, "peak_flops_per_s": peaks, "threads": threads, "measured": rows,
+        }))?;
     }
     Ok(())
+}
+
+fn no_picture(file: &std::path::Path, error: &std::io::Error) -> Failure {
+    Failure::bad_input(format!("--roofline {}: {error}", file.display()))
+}
+
+/// A target with each combination of what may be tuned on a GPU.
+fn tuned(target: &Target, arguments: &Arguments) -> Result<Vec<Target>, Failure> {
+    let given = !arguments.work_group.is_empty() || !arguments.per_invocation.is_empty();
+    match target {
+        Target::Cpu if given => Err(Failure::bad_input(
+            "--work-group and --per-invocation are of GPUs, and this call measures the CPU; add --device gpu",
+        )),
+        Target::Cpu => Ok(vec![Target::Cpu]),
+        #[cfg(feature = "gpu")]
+        Target::Gpu(gpu, options) => {
+            let or = |given: &[u32], default| if given.is_empty() { vec![default] } else { given.to_vec() };
+            let mut targets = vec![];
+            for work_group_size in or(&arguments.work_group, options.work_group_size) {
+                if !work_group_size.is_power_of_two() {
+                    return Err(Failure::bad_input(format!("--work-group {work_group_size}: not a power of two")));
+                }
+                for elements_per_invocation in or(&arguments.per_invocation, options.elements_per_invocation) {
+                    let options = GpuOptions { work_group_size, elements_per_invocation, ..*options };
+                    targets.push(Target::Gpu(std::sync::Arc::clone(gpu), options));
+                }
+            }
+            Ok(targets)
+        }
+    }
+}
+
+/// A target's name, with what is tuned on it.
+fn name(target: &Target) -> String {
+    match target {
+        Target::Cpu => target.name(),
+        #[cfg(feature = "gpu")]
+        Target::Gpu(_, GpuOptions { work_group_size, elements_per_invocation, .. }) => {
+            let elements = if *elements_per_invocation == 1 { "element" } else { "elements" };
+            format!("{}, groups of {work_group_size}, {elements_per_invocation} {elements} each", target.name())
+        }
+    }
 }
 
 fn unknown<'a>(what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> Failure {
@@ -140,72 +237,4 @@ fn failed(error: MeasureError) -> Failure {
         }
         MeasureError::LeftDomain(_) | MeasureError::Step(_) => Failure::Simulation(error.to_string()),
     }
-}
-
-/// The share of the triad's bandwidth that an operation's least traffic takes.
-fn share(bytes: f64, elements: usize, seconds: f64, bandwidth: f64) -> f64 {
-    bytes * elements as f64 / seconds / bandwidth
-}
-
-fn as_text(subject: &Subject, measured: &Measured, device: &str, bandwidth: f64) -> String {
-    let elements = measured.elements;
-    let mut rows = vec![
-        ["", "median ms", "min", "max", "Melements/s", "flops/element", "Gflop/s", "bytes/element", "of the triad"]
-            .map(String::from)
-            .to_vec(),
-    ];
-    for timing in &measured.timings {
-        let median = timing.median();
-        let ms = |s: f64| format!("{:.3}", 1e3 * s);
-        let rate = |each: f64| each * timing.rate(elements);
-        let [flops, gflops] = match timing.flops {
-            Some(flops) => [flops.to_string(), format!("{:.2}", rate(flops.into()) / 1e9)],
-            None => [String::new(), String::new()],
-        };
-        let [bytes, part] = match timing.bytes {
-            Some(bytes) => {
-                [format!("{bytes:.0}"), format!("{:.0} %", 100.0 * share(bytes, elements, median, bandwidth))]
-            }
-            None => [String::new(), String::new()],
-        };
-        let (first, last) = (timing.seconds[0], timing.seconds[timing.seconds.len() - 1]);
-        let melements = format!("{:.2}", rate(1.0) / 1e6);
-        rows.push(vec![
-            timing.operation.into(),
-            ms(median),
-            ms(first),
-            ms(last),
-            melements,
-            flops,
-            gflops,
-            bytes,
-            part,
-        ]);
-    }
-    format!(
-        "{}, {} {}, {} nodes, {}, {device}\n{}",
-        subject.law.info.name,
-        elements,
-        subject.element.info.name,
-        measured.nodes,
-        precision_name(subject.precision),
-        text::columns("  ", &rows)
-    )
-}
-
-fn as_json(subject: &Subject, measured: &Measured, device: &str, bandwidth: f64) -> Value {
-    let elements = measured.elements;
-    let timing = |t: &Timing| {
-        json!({
-            "operation": t.operation, "seconds": t.seconds, "median_s": t.median(),
-            "elements_per_s": t.rate(elements), "flops_per_element": t.flops,
-            "bytes_per_element": t.bytes,
-            "share_of_triad": t.bytes.map(|bytes| share(bytes, elements, t.median(), bandwidth)),
-        })
-    };
-    json!({
-        "law": subject.law.info.name, "element": subject.element.info.name, "elements": elements,
-        "nodes": measured.nodes, "precision": precision_name(subject.precision), "device": device,
-        "timings": measured.timings.iter().map(timing).collect::<Vec<_>>(),
-    })
 }

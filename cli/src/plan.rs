@@ -26,7 +26,7 @@ pub struct Arguments {
 
 /// Prints the plan of a scene.
 pub fn call(arguments: &Arguments) -> Result<(), Failure> {
-    let scene = arguments.scene.load()?;
+    let scene = arguments.scene.load(None)?;
     let model = build(&scene).map_err(|e| Failure::bad_input(e.to_string()))?;
     let layout = layout(&arguments.device, scene.solver.precision)
         .map_err(|e| Failure::bad_input(format!("--device {}: {e}", arguments.device)))?;

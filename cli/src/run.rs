@@ -30,6 +30,10 @@ pub struct Arguments {
     /// any GPU; `tensormass devices` lists their names.
     #[arg(long, value_name = "auto|cpu|gpu|gpu:NAME", default_value_t = DeviceChoice::Auto)]
     device: DeviceChoice,
+    /// Measure before the first step how products with the tangent are faster on this CPU; as --set
+    /// solver.cg.tangent=measured. Results do not depend on it.
+    #[arg(long)]
+    tune: bool,
     /// Print nothing but errors.
     #[arg(long)]
     quiet: bool,
@@ -52,11 +56,17 @@ pub struct SceneArguments {
 }
 
 impl SceneArguments {
-    /// Reads the scene with its changes.
-    pub fn load(&self) -> Result<Scene, Failure> {
+    /// Reads the scene with its changes, and maybe one more.
+    pub fn load(&self, also: Option<&str>) -> Result<Scene, Failure> {
         let precision = self.precision.iter().map(|p| format!("solver.precision={p}"));
-        let changes: Result<Vec<Override>, _> =
-            self.set.iter().cloned().chain(precision).map(|s| Override::parse(&s)).collect();
+        let changes: Result<Vec<Override>, _> = self
+            .set
+            .iter()
+            .cloned()
+            .chain(precision)
+            .chain(also.map(str::to_owned))
+            .map(|s| Override::parse(&s))
+            .collect();
         let changes = changes.map_err(|e| Failure::bad_input(e.to_string()))?;
         load(&self.scene, &changes).map_err(|e| Failure::bad_input(e.to_string()))
     }
@@ -64,7 +74,7 @@ impl SceneArguments {
 
 /// Runs a scene.
 pub fn call(arguments: &Arguments) -> Result<(), Failure> {
-    let scene = arguments.scene.load()?;
+    let scene = arguments.scene.load(arguments.tune.then_some("solver.cg.tangent=measured"))?;
     let target = Target::open(&arguments.device, scene.solver.precision)
         .map_err(|e| Failure::bad_input(format!("--device {}: {e}", arguments.device)))?;
     let out = arguments.out.clone().unwrap_or_else(|| default_out(&scene));

@@ -58,10 +58,10 @@ fn every_operation_is_measured_and_counted() {
         } else {
             assert!(flops(4) < flops(2), "what is stored is not computed again");
         }
-        // An element has four places of 2 bytes; all are one cluster, whose nodes have a number, and a slot with a number.
+        // An element has four places of 2 bytes; all are one cluster, to which no node is foreign.
         let bytes = |k: usize| number(&timings[k]["bytes_per_element"]);
         let real = if one["precision"] == "f64" { 8.0 } else { 4.0 };
-        let of_nodes = 99.0 / 240.0 * (4.0 + (2.0 * 4.0 * real + 4.0) + 3.0 * 3.0 * real);
+        let of_nodes = 99.0 / 240.0 * (2.0 * 3.0 * real + 3.0 * 3.0 * real);
         assert!((bytes(1) - (8.0 + 10.0 * real + of_nodes)).abs() < 1e-9, "{}", bytes(1));
         let stored = if one["law"] == "hooke" { 0.0 } else { 12.0 };
         assert!((bytes(4) - bytes(1) - stored * real).abs() < 1e-9, "{}", bytes(4));
@@ -84,13 +84,21 @@ fn elements_of_every_dimension() {
 
 #[test]
 fn what_cannot_be_measured_is_bad_input() {
-    let cases: [(&[&str], &str); 9] = [
+    let cases: [(&[&str], &str); 14] = [
         (&["--law", "hoke"], "error: there is no law `hoke`; did you mean `hooke`?"),
         (&["--element", "segment_p1"], "error: there is no element `segment_p1`"),
         (&["--precision", "f16"], "precisions are f32 and f64"),
         (&["--elements", "0"], "0 is not in 1..=50000000"),
         (&["--device", "gpu", "--precision", "f64"], "a GPU computes in f32"),
         (&["--cells", "20x10"], "cells are three numbers from 1 to 10000"),
+        (&["--stiffness-ratio", "0"], "a ratio is a number from 1e-9 to 1e9"),
+        (&["--device", "cpu", "--work-group", "32"], "--work-group and --per-invocation are of GPUs"),
+        (&["--work-group", "512"], "512 is not in 1..=256"),
+        (&["--implicit", "--baseline", "echo"], "cannot be used with"),
+        (
+            &["--law", "hooke", "--elements", "30", "--repeats", "1", "--device", "cpu", "--roofline", "/"],
+            "--roofline /: ",
+        ),
         (&["--baseline", "no-such-program", "--law", "hooke", "--elements", "30"], "it does not start"),
         (&["--baseline", "false", "--law", "hooke", "--elements", "30"], "it ended with exit status: 1"),
         (&["--baseline", "echo", "--law", "hooke", "--elements", "30"], "it has to print JSON"),
@@ -100,6 +108,51 @@ fn what_cannot_be_measured_is_bad_input() {
         assert_eq!((status, out.as_str()), (Some(2), ""), "{arguments:?}");
         assert!(err.contains(message), "{arguments:?}: {err}");
     }
+}
+
+/// An implicit step: which preconditioners, what they reach, and what a step consists of.
+#[test]
+fn an_implicit_step_is_solved_to_a_true_residual() {
+    let subject = ["--law", "hooke", "--cells", "10x2x2", "--repeats", "1", "--device", "cpu", "--precision", "f64"];
+    let iterations = |ratio: &str| {
+        let found = json(&[&subject[..], &["--implicit", "--stiffness-ratio", ratio]].concat());
+        let step = &found["measured"][0]["implicit_step"];
+        assert_eq!(
+            (number(&step["stiffness_ratio"]), number(&step["tolerance"])),
+            (ratio.parse().expect("a number"), 1e-5)
+        );
+        let parts: Vec<_> = step["parts_s"].as_object().expect("parts").keys().cloned().collect();
+        assert_eq!(parts.len(), 5, "{parts:?}");
+        let solutions = step["solutions"].as_array().expect("a list");
+        let names: Vec<_> = solutions.iter().map(|s| s["preconditioner"].as_str().expect("a name")).collect();
+        assert_eq!(names, ["jacobi", "none"]);
+        for solution in solutions {
+            assert!(number(&solution["residual"]) <= 1e-5 && number(&solution["median_s"]) > 0.0, "{solution}");
+        }
+        [0, 1].map(|k| number(&solutions[k]["iterations"]))
+    };
+    // What stiffnesses differ by, a diagonal knows: it gains more where they do.
+    let ([jacobi, none], [jacobi_of_unlike, none_of_unlike]) = (iterations("1"), iterations("1000"));
+    let (gain, gain_of_unlike) = (none / jacobi, none_of_unlike / jacobi_of_unlike);
+    assert!(gain_of_unlike >= 3.0 && gain_of_unlike > gain, "fewer iterations by {gain_of_unlike}, alike by {gain}");
+    assert!(none_of_unlike > none, "{none_of_unlike} iterations without a preconditioner, {none} alike");
+}
+
+#[test]
+fn a_roofline_has_roofs_and_every_counted_operation() {
+    let folder = std::env::temp_dir().join(format!("tensormass-roofline-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let file = folder.join("roof.svg");
+    let found = json(&[&SMALL[..], &["--law", "yeoh", "--roofline", file.to_str().expect("a path")]].concat());
+    let peak = number(&found["peak_flops_per_s"]["f32"]);
+    assert!(peak > number(&found["triad_bytes_per_s"]) / 8.0, "{peak} operations a second");
+    let picture = std::fs::read_to_string(&file).expect("a picture");
+    std::fs::remove_dir_all(&folder).expect("a folder of ours");
+    assert_eq!(picture.matches("<circle").count(), 6, "{picture}");
+    for word in ["triad", "Gflop/s, f32", "apply of yeoh, f32, 240"] {
+        assert!(picture.contains(word), "no `{word}`: {picture}");
+    }
+    assert!(!picture.contains("NaN") && !picture.contains("inf"), "{picture}");
 }
 
 /// This program beside itself: it is called with the same arguments, and every operation of both is compared.

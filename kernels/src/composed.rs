@@ -3,7 +3,7 @@
 //! Laws and elements meet through function pointers, some blocks at a time, so that what is compiled is the sum of the
 //! two, not the product: G and P stay in the innermost cache.
 
-use crate::blocks::{Blocks, States};
+use crate::blocks::{Blocks, Part, States};
 use crate::element::{ElementEntry, ElementInfo, ElementKernels, Elements, Table};
 use crate::lanes::{Engine, Lanes, Node, Registers};
 use crate::law::LawEntry;
@@ -19,31 +19,31 @@ pub trait Compute<R>: Send + Sync {
     /// Elements of a block.
     fn lanes(&self) -> usize;
     /// Displacements u -> each element's strain energy (unit of stress times m^3).
-    fn energy(&self, blocks: &Blocks<R>, u: &[Node<R>], out: &mut [R]) -> Outside;
+    fn energy(&self, part: Part<R>, u: &[Node<R>], out: &mut [R]) -> Outside;
     /// Displacements u -> nodal forces f_j = - integral of P grad Lambda_j, added to f.
-    fn force(&self, blocks: &Blocks<R>, u: &[Node<R>], f: &mut [Node<R>]) -> Outside;
+    fn force(&self, part: Part<R>, u: &[Node<R>], f: &mut [Node<R>]) -> Outside;
     /// Displacements u and increments du -> the differentials of the nodal forces, added to df.
-    fn dforce(&self, blocks: &Blocks<R>, u: [&[Node<R>]; 2], df: &mut [Node<R>]);
+    fn dforce(&self, part: Part<R>, u: [&[Node<R>]; 2], df: &mut [Node<R>]);
     /// Numbers stored of an element's state for [`Compute::apply`].
     fn stored(&self) -> usize;
-    /// Room for the state of a cluster.
+    /// Room for the state of a batch.
     fn states(&self, blocks: &Blocks<R>) -> States<R>;
     /// Displacements u -> what is stored for [`Compute::apply`].
-    fn linearize(&self, blocks: &Blocks<R>, u: &[Node<R>], states: &mut States<R>);
-    /// What was stored of u and increments du -> the differentials of [`Compute::dforce`], added to df.
-    fn apply(&self, blocks: &Blocks<R>, states: &States<R>, du: &[Node<R>], df: &mut [Node<R>]);
+    fn linearize(&self, part: Part<R>, u: &[Node<R>], states: &mut [R]);
+    /// What was stored of u ([`States::of`]) and increments du -> the differentials of [`Compute::dforce`], added to df.
+    fn apply(&self, part: Part<R>, states: &[R], du: &[Node<R>], df: &mut [Node<R>]);
     /// Displacements u -> the diagonal of the tangent stiffness -df/du, added to d.
-    fn diagonal(&self, blocks: &Blocks<R>, u: &[Node<R>], d: &mut [Node<R>]);
+    fn diagonal(&self, part: Part<R>, u: &[Node<R>], d: &mut [Node<R>]);
     /// Displacements u -> each element's Cauchy stress, the mean over its volume at rest.
-    fn cauchy(&self, blocks: &Blocks<R>, u: &[Node<R>], out: &mut [[R; 9]]);
+    fn cauchy(&self, part: Part<R>, u: &[Node<R>], out: &mut [[R; 9]]);
     /// Displacements u and velocities v -> each element's dissipation potential; 0 where the law has none.
-    fn dissipation(&self, blocks: &Blocks<R>, u_v: [&[Node<R>]; 2], out: &mut [R]);
+    fn dissipation(&self, part: Part<R>, u_v: [&[Node<R>]; 2], out: &mut [R]);
     /// Displacements u and velocities v -> nodal damping forces, added to f; none where the law has no dissipation.
-    fn damping(&self, blocks: &Blocks<R>, u_v: [&[Node<R>]; 2], f: &mut [Node<R>]);
+    fn damping(&self, part: Part<R>, u_v: [&[Node<R>]; 2], f: &mut [Node<R>]);
     /// The differentials of [`Compute::damping`] where the velocities change by dv, added to df.
-    fn ddamping(&self, blocks: &Blocks<R>, u_v_dv: [&[Node<R>]; 3], df: &mut [Node<R>]);
+    fn ddamping(&self, part: Part<R>, u_v_dv: [&[Node<R>]; 3], df: &mut [Node<R>]);
     /// The diagonal of minus that differential, added to d.
-    fn damping_diagonal(&self, blocks: &Blocks<R>, u_v: [&[Node<R>]; 2], d: &mut [Node<R>]);
+    fn damping_diagonal(&self, part: Part<R>, u_v: [&[Node<R>]; 2], d: &mut [Node<R>]);
 }
 
 /// A law on an element.
@@ -96,27 +96,45 @@ impl<V: Tabled> Composed<V> {
         std::array::from_fn(|_| vec![[V::from_f64(0.0); 9]; points])
     }
 
+    /// The gradients of some vectors.
+    fn gradients<const N: usize>(
+        &self,
+        elements: &Elements<V>,
+        vectors: [&[Node<V::Scalar>]; N],
+        out: &mut [Vec<[V; 9]>; N],
+    ) {
+        // Two at once, where there are two.
+        for (vectors, out) in vectors.chunks(2).zip(out.chunks_mut(2)) {
+            match (vectors, out) {
+                ([u, v], [g, rate]) => (self.element.gradients)(elements, [u, v], [g, rate]),
+                ([u], [g]) => (self.element.gradient)(elements, [u], [g]),
+                _ => unreachable!("as many gradients as vectors"),
+            }
+        }
+    }
+
     /// Calls for each group of blocks, with how many elements are before it.
-    fn groups(&self, blocks: &Blocks<V::Scalar>, mut call: impl FnMut(usize, Elements<V>, Material<V>)) {
+    fn groups(&self, part: Part<V::Scalar>, mut call: impl FnMut(usize, Elements<V>, Material<V>)) {
+        let blocks = part.blocks;
         let (group, count, points) = (self.group(), blocks.constants(), self.info.points.len());
-        let sets = if blocks.per_element() { group.min(blocks.len()) } else { 1 };
+        let sets = if blocks.per_element() { group.min(part.len()) } else { 1 };
         let mut constants = vec![V::from_f64(0.0); sets * count];
-        blocks.load_constants(0, &mut constants);
-        for first in (0..blocks.len()).step_by(group) {
-            let here = group.min(blocks.len() - first);
-            if blocks.per_element() && first > 0 {
+        blocks.load_constants(part.first, &mut constants);
+        for before in (0..part.len()).step_by(group) {
+            let (first, here) = (part.first + before, group.min(part.len() - before));
+            if blocks.per_element() && before > 0 {
                 blocks.load_constants(first, &mut constants[..here * count]);
             }
             let stride = if blocks.per_element() { count } else { 0 };
             let material = Material { constants: &constants, stride, count, points };
-            call(first * V::COUNT, Elements { blocks, first, count: here, table: &self.table }, material);
+            call(before * V::COUNT, Elements { blocks, first, count: here, table: &self.table }, material);
         }
     }
 
     /// What a law makes of some gradients, contracted to the nodes.
     fn contracted<const N: usize>(
         &self,
-        blocks: &Blocks<V::Scalar>,
+        part: Part<V::Scalar>,
         vectors: [&[Node<V::Scalar>]; N],
         f: &mut [Node<V::Scalar>],
         law: impl Fn(&Material<V>, [&[[V; 9]]; N], &mut [[V; 9]]) -> Outside,
@@ -124,11 +142,9 @@ impl<V: Tabled> Composed<V> {
         let mut gradients = self.tensors::<N>();
         let [mut stress] = self.tensors::<1>();
         let mut outside = None;
-        self.groups(blocks, |before, elements, material| {
+        self.groups(part, |before, elements, material| {
             let points = elements.count * material.points;
-            for (vector, gradient) in vectors.iter().zip(&mut gradients) {
-                (self.element.gradient)(&elements, vector, gradient);
-            }
+            self.gradients(&elements, vectors, &mut gradients);
             let stress = &mut stress[..points];
             let here = law(&material, gradients.each_ref().map(|g| &g[..points]), stress);
             (self.element.contract)(&elements, stress, f);
@@ -140,18 +156,16 @@ impl<V: Tabled> Composed<V> {
     /// What a law makes of some gradients, and those of the nodes' functions, integrated at the nodes.
     fn at_nodes<const N: usize>(
         &self,
-        blocks: &Blocks<V::Scalar>,
+        part: Part<V::Scalar>,
         vectors: [&[Node<V::Scalar>]; N],
         d: &mut [Node<V::Scalar>],
         law: impl Fn(&Material<V>, [&[[V; 9]]; N], &mut [[V; 3]]),
     ) {
         let mut gradients = self.tensors::<N>();
         let mut at_points = vec![[V::from_f64(0.0); 3]; self.group() * self.info.points.len() * self.info.nodes];
-        self.groups(blocks, |_, elements, material| {
+        self.groups(part, |_, elements, material| {
             let points = elements.count * material.points;
-            for (vector, gradient) in vectors.iter().zip(&mut gradients) {
-                (self.element.gradient)(&elements, vector, gradient);
-            }
+            self.gradients(&elements, vectors, &mut gradients);
             let at_points = &mut at_points[..points * self.info.nodes];
             (self.element.node_gradients)(&elements, at_points);
             law(&material, gradients.each_ref().map(|g| &g[..points]), at_points);
@@ -162,7 +176,7 @@ impl<V: Tabled> Composed<V> {
     /// The integral over each element of what a law makes of some gradients.
     fn integrated<const N: usize>(
         &self,
-        blocks: &Blocks<V::Scalar>,
+        part: Part<V::Scalar>,
         vectors: [&[Node<V::Scalar>]; N],
         out: &mut [V::Scalar],
         law: impl Fn(&Material<V>, [&[[V; 9]]; N], &mut [V]) -> Outside,
@@ -171,11 +185,9 @@ impl<V: Tabled> Composed<V> {
         let mut densities = vec![V::from_f64(0.0); self.group() * self.info.points.len()];
         let mut integrals = vec![V::from_f64(0.0); self.group()];
         let mut outside = None;
-        self.groups(blocks, |before, elements, material| {
+        self.groups(part, |before, elements, material| {
             let points = elements.count * material.points;
-            for (vector, gradient) in vectors.iter().zip(&mut gradients) {
-                (self.element.gradient)(&elements, vector, gradient);
-            }
+            self.gradients(&elements, vectors, &mut gradients);
             let here = law(&material, gradients.each_ref().map(|g| &g[..points]), &mut densities[..points]);
             (self.element.integrate)(&elements, &densities, &mut integrals);
             outside = outside.or(here.map(|e| before + e));
@@ -194,16 +206,16 @@ impl<V: Tabled> Compute<V::Scalar> for Composed<V> {
         V::COUNT
     }
 
-    fn energy(&self, blocks: &Blocks<V::Scalar>, u: &[Node<V::Scalar>], out: &mut [V::Scalar]) -> Outside {
-        self.integrated(blocks, [u], out, |material, [g], out| (self.law.energy)(material, g, out))
+    fn energy(&self, part: Part<V::Scalar>, u: &[Node<V::Scalar>], out: &mut [V::Scalar]) -> Outside {
+        self.integrated(part, [u], out, |material, [g], out| (self.law.energy)(material, g, out))
     }
 
-    fn force(&self, blocks: &Blocks<V::Scalar>, u: &[Node<V::Scalar>], f: &mut [Node<V::Scalar>]) -> Outside {
-        self.contracted(blocks, [u], f, |material, [g], out| (self.law.force)(material, g, out))
+    fn force(&self, part: Part<V::Scalar>, u: &[Node<V::Scalar>], f: &mut [Node<V::Scalar>]) -> Outside {
+        self.contracted(part, [u], f, |material, [g], out| (self.law.force)(material, g, out))
     }
 
-    fn dforce(&self, blocks: &Blocks<V::Scalar>, u_du: [&[Node<V::Scalar>]; 2], df: &mut [Node<V::Scalar>]) {
-        self.contracted(blocks, u_du, df, |material, [g, dg], out| {
+    fn dforce(&self, part: Part<V::Scalar>, u_du: [&[Node<V::Scalar>]; 2], df: &mut [Node<V::Scalar>]) {
+        self.contracted(part, u_du, df, |material, [g, dg], out| {
             (self.law.dforce)(material, g, dg, out);
             None
         });
@@ -217,45 +229,39 @@ impl<V: Tabled> Compute<V::Scalar> for Composed<V> {
         States::new(blocks, self.stored)
     }
 
-    fn linearize(&self, blocks: &Blocks<V::Scalar>, u: &[Node<V::Scalar>], states: &mut States<V::Scalar>) {
+    fn linearize(&self, part: Part<V::Scalar>, u: &[Node<V::Scalar>], states: &mut [V::Scalar]) {
         if self.stored == 0 {
             return;
         }
         let [mut g] = self.tensors();
-        self.groups(blocks, |before, elements, material| {
+        self.groups(part, |before, elements, material| {
             let points = elements.count * material.points;
-            (self.element.gradient)(&elements, u, &mut g);
-            let states = states.of_mut(before / V::COUNT, elements.count, self.of_block());
+            (self.element.gradient)(&elements, [u], [&mut g]);
+            let states = &mut states[before / V::COUNT * self.of_block()..][..elements.count * self.of_block()];
             (self.law.linearize)(&material, &g[..points], states);
         });
     }
 
-    fn apply(
-        &self,
-        blocks: &Blocks<V::Scalar>,
-        states: &States<V::Scalar>,
-        du: &[Node<V::Scalar>],
-        df: &mut [Node<V::Scalar>],
-    ) {
+    fn apply(&self, part: Part<V::Scalar>, states: &[V::Scalar], du: &[Node<V::Scalar>], df: &mut [Node<V::Scalar>]) {
         let [mut dg, mut stress] = self.tensors();
-        self.groups(blocks, |before, elements, material| {
+        self.groups(part, |before, elements, material| {
             let points = elements.count * material.points;
-            (self.element.gradient)(&elements, du, &mut dg);
-            let states = states.of(before / V::COUNT, self.of_block());
+            (self.element.gradient)(&elements, [du], [&mut dg]);
+            let states = &states[before / V::COUNT * self.of_block()..];
             (self.law.apply)(&material, states, &dg[..points], &mut stress[..points]);
             (self.element.contract)(&elements, &stress, df);
         });
     }
 
-    fn diagonal(&self, blocks: &Blocks<V::Scalar>, u: &[Node<V::Scalar>], d: &mut [Node<V::Scalar>]) {
-        self.at_nodes(blocks, [u], d, |material, [g], out| (self.law.diagonal)(material, g, out));
+    fn diagonal(&self, part: Part<V::Scalar>, u: &[Node<V::Scalar>], d: &mut [Node<V::Scalar>]) {
+        self.at_nodes(part, [u], d, |material, [g], out| (self.law.diagonal)(material, g, out));
     }
 
-    fn cauchy(&self, blocks: &Blocks<V::Scalar>, u: &[Node<V::Scalar>], out: &mut [[V::Scalar; 9]]) {
+    fn cauchy(&self, part: Part<V::Scalar>, u: &[Node<V::Scalar>], out: &mut [[V::Scalar; 9]]) {
         let [mut g, mut stress, mut means] = self.tensors();
-        self.groups(blocks, |before, elements, material| {
+        self.groups(part, |before, elements, material| {
             let points = elements.count * material.points;
-            (self.element.gradient)(&elements, u, &mut g);
+            (self.element.gradient)(&elements, [u], [&mut g]);
             (self.law.cauchy)(&material, &g[..points], &mut stress[..points]);
             (self.element.mean)(&elements, &stress, &mut means);
             let mut all = vec![V::Scalar::default(); V::COUNT];
@@ -268,32 +274,32 @@ impl<V: Tabled> Compute<V::Scalar> for Composed<V> {
         });
     }
 
-    fn dissipation(&self, blocks: &Blocks<V::Scalar>, u_v: [&[Node<V::Scalar>]; 2], out: &mut [V::Scalar]) {
+    fn dissipation(&self, part: Part<V::Scalar>, u_v: [&[Node<V::Scalar>]; 2], out: &mut [V::Scalar]) {
         let Some(damping) = &self.damping else { return out.fill(V::Scalar::default()) };
-        self.integrated(blocks, u_v, out, |material, [g, rate], out| {
+        self.integrated(part, u_v, out, |material, [g, rate], out| {
             (damping.dissipation)(material, g, rate, out);
             None
         });
     }
 
-    fn damping(&self, blocks: &Blocks<V::Scalar>, u_v: [&[Node<V::Scalar>]; 2], f: &mut [Node<V::Scalar>]) {
+    fn damping(&self, part: Part<V::Scalar>, u_v: [&[Node<V::Scalar>]; 2], f: &mut [Node<V::Scalar>]) {
         let Some(damping) = &self.damping else { return };
-        self.contracted(blocks, u_v, f, |material, [g, rate], out| {
+        self.contracted(part, u_v, f, |material, [g, rate], out| {
             (damping.damping)(material, g, rate, out);
             None
         });
     }
 
-    fn ddamping(&self, blocks: &Blocks<V::Scalar>, u_v_dv: [&[Node<V::Scalar>]; 3], df: &mut [Node<V::Scalar>]) {
+    fn ddamping(&self, part: Part<V::Scalar>, u_v_dv: [&[Node<V::Scalar>]; 3], df: &mut [Node<V::Scalar>]) {
         let Some(damping) = &self.damping else { return };
-        self.contracted(blocks, u_v_dv, df, |material, [g, rate, dg], out| {
+        self.contracted(part, u_v_dv, df, |material, [g, rate, dg], out| {
             (damping.ddamping)(material, g, rate, dg, out);
             None
         });
     }
 
-    fn damping_diagonal(&self, blocks: &Blocks<V::Scalar>, u_v: [&[Node<V::Scalar>]; 2], d: &mut [Node<V::Scalar>]) {
+    fn damping_diagonal(&self, part: Part<V::Scalar>, u_v: [&[Node<V::Scalar>]; 2], d: &mut [Node<V::Scalar>]) {
         let Some(damping) = &self.damping else { return };
-        self.at_nodes(blocks, u_v, d, |material, [g, rate], out| (damping.diagonal)(material, g, rate, out));
+        self.at_nodes(part, u_v, d, |material, [g, rate], out| (damping.diagonal)(material, g, rate, out));
     }
 }

@@ -124,7 +124,8 @@ pub trait Element: Send + Sync + 'static {
     type Nodal<R: Real>: AsRef<[[R; 3]]> + AsMut<[[R; 3]]> + Copy;
     /// What the element is.
     fn info() -> &'static ElementInfo;
-    /// The zero vector at each node.
+    /// Minus zero in every component at each node: a sum that begins with it is that of what is added, bit for bit, so that
+    /// compilers need not add it.
     fn nodal<R: Real>() -> Self::Nodal<R>;
     /// G = sum_j u_j (x) grad Lambda_j; `slopes` as [`Table`] has them.
     fn gradient<R: Real>(u: &Self::Nodal<R>, slopes: &[R], inverse_jacobian: &[R; 9]) -> [R; 9];
@@ -178,8 +179,9 @@ pub struct Elements<'a, V: Lanes> {
     pub(crate) table: &'a Table<V>,
 }
 
-/// Nodal vectors -> their gradients at each quadrature point.
-pub(crate) type GradientKernel<V> = fn(&Elements<V>, &[Node<<V as Lanes>::Scalar>], &mut [[V; 9]]);
+/// Nodal vectors, N of them -> their gradients at each quadrature point.
+pub(crate) type GradientKernel<V, const N: usize> =
+    fn(&Elements<V>, [&[Node<<V as Lanes>::Scalar>]; N], [&mut [[V; 9]]; N]);
 /// A stress at each quadrature point -> nodal forces, added to the nodes.
 pub(crate) type ContractKernel<V> = fn(&Elements<V>, &[[V; 9]], &mut [Node<<V as Lanes>::Scalar>]);
 /// The gradient of each node's function at each quadrature point.
@@ -194,7 +196,9 @@ pub(crate) type MeanKernel<V> = fn(&Elements<V>, &[[V; 9]], &mut [[V; 9]]);
 #[derive(Debug, Clone, Copy)]
 pub struct ElementKernels<V: Lanes> {
     /// G at each quadrature point.
-    pub(crate) gradient: GradientKernel<V>,
+    pub(crate) gradient: GradientKernel<V, 1>,
+    /// As [`Self::gradient`] of two vectors, whose elements are read once.
+    pub(crate) gradients: GradientKernel<V, 2>,
     /// Nodal forces.
     pub(crate) contract: ContractKernel<V>,
     /// Gradients of the functions.
@@ -225,20 +229,46 @@ impl ElementEntry {
     }
 }
 
-/// See [`GradientKernel`].
+/// See [`ElementKernels::gradient`].
 #[inline(always)]
-pub(crate) fn gradient<E: Element, V: Lanes>(elements: &Elements<V>, u: &[Node<V::Scalar>], out: &mut [[V; 9]]) {
+pub(crate) fn gradient<E: Element, V: Lanes>(
+    elements: &Elements<V>,
+    u: [&[Node<V::Scalar>]; 1],
+    out: [&mut [[V; 9]]; 1],
+) {
+    gradients_of::<E, V, 1>(elements, u, out);
+}
+
+/// See [`ElementKernels::gradients`].
+#[inline(always)]
+pub(crate) fn gradients<E: Element, V: Lanes>(
+    elements: &Elements<V>,
+    u: [&[Node<V::Scalar>]; 2],
+    out: [&mut [[V; 9]]; 2],
+) {
+    gradients_of::<E, V, 2>(elements, u, out);
+}
+
+#[inline(always)]
+fn gradients_of<E: Element, V: Lanes, const N: usize>(
+    elements: &Elements<V>,
+    vectors: [&[Node<V::Scalar>]; N],
+    mut out: [&mut [[V; 9]]; N],
+) {
     let points = E::info().points.len();
     let Elements { blocks, first, count, table } = *elements;
     for block in 0..count {
         blocks.prefetch(first + count + block);
-        let mut nodal = E::nodal();
-        for (node, vector) in nodal.as_mut().iter_mut().enumerate() {
-            *vector = blocks.gather(u, first + block, node);
-        }
-        for q in 0..points {
-            let (inverse_jacobian, _) = blocks.rest::<V>(first + block, q);
-            out[block * points + q] = E::gradient(&nodal, table.point(q), &inverse_jacobian);
+        // One vector after the other: of two at once there are more numbers than registers.
+        for (vector, out) in vectors.iter().zip(&mut out) {
+            let mut nodal = E::nodal();
+            for (node, vector_at_node) in nodal.as_mut().iter_mut().enumerate() {
+                *vector_at_node = blocks.gather(vector, first + block, node);
+            }
+            for q in 0..points {
+                let (inverse_jacobian, _) = blocks.rest::<V>(first + block, q);
+                out[block * points + q] = E::gradient(&nodal, table.point(q), &inverse_jacobian);
+            }
         }
     }
 }

@@ -8,6 +8,7 @@
 // Generated text names this crate as any other crate would.
 extern crate self as tensormass_kernels;
 
+mod aligned;
 mod blocks;
 mod composed;
 pub mod damping;
@@ -19,11 +20,11 @@ mod real;
 pub mod shader;
 mod table;
 
-pub use blocks::{Blocks, Cluster, States, copy_nodes, most_nodes};
+pub use blocks::{Blocks, Cluster, Part, States, most_nodes};
 pub use composed::{Compute, compose};
 pub use damping::{DampingEntry, Dissipative};
 pub use element::{Element, ElementEntry, ElementInfo, Face, Numbering, ReferencePoint, RestPoint, Term};
-pub use lanes::{Engine, Lanes, Node};
+pub use lanes::{Chains, Engine, Lanes, Node};
 pub use law::{Acceptance, Law, LawEntry, LawInfo, LawSource, Operations, ParameterInfo, Structure};
 pub use real::Real;
 pub use table::Precision;

@@ -1,6 +1,6 @@
 //! A law's point kernels over a range of quadrature points, whatever element these are of.
 
-use crate::blocks::prefetch;
+use crate::aligned::prefetch;
 use crate::damping::Dissipative;
 use crate::lanes::Lanes;
 use crate::law::Law;

@@ -31,6 +31,7 @@ pub mod scene;
 pub mod simulate;
 pub mod step_limit;
 pub mod system;
+pub mod tangent;
 pub mod target;
 
 pub use tensormass_kernels::{

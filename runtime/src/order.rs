@@ -3,9 +3,7 @@
 //! Recursive coordinate bisection (Berger & Bokhari 1987): elements are halved by their centres along the longest side of
 //! the box around them, until what is left is a cluster. The order depends on nothing but the mesh.
 
-use std::collections::HashSet;
-
-use crate::body::{Body, LawBatch};
+use crate::body::Body;
 
 /// Nodes that the elements of a cluster name, each as often as it is named: so many vectors stay in the innermost cache.
 const NAMED: usize = 4096;
@@ -55,12 +53,47 @@ pub fn compact(elements: &mut [u32], centres: &[[f64; 3]], size: usize) {
     }
 }
 
-/// How many nodes the clusters of a batch have, one shared by several counting in each.
-pub fn cluster_nodes(body: &Body, batch: &LawBatch) -> usize {
-    let size = cluster_size(batch.element.info.nodes, batch.elements.len());
-    let of_cluster = |elements: &[u32]| {
-        let nodes: HashSet<u32> = elements.iter().flat_map(|e| &body.elements[*e as usize]).copied().collect();
-        nodes.len()
-    };
-    batch.elements.chunks(size).map(of_cluster).sum()
+/// How clusters share nodes: each node belongs to the first cluster that meets it, and is foreign to the others.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Sharing {
+    /// Nodes that are foreign to a cluster, one counted for each.
+    pub foreign: usize,
+    /// Nodes that are foreign to some cluster.
+    pub shared: usize,
+}
+
+/// How the clusters of a body share nodes.
+pub fn sharing(body: &Body) -> Sharing {
+    // The last cluster that met a node, and how many did.
+    let mut met = vec![(0, 0); body.masses.len()];
+    let mut cluster = 0;
+    for batch in &body.batches {
+        for elements in batch.elements.chunks(cluster_size(batch.element.info.nodes, batch.elements.len())) {
+            cluster += 1;
+            for node in elements.iter().flat_map(|e| &body.elements[*e as usize]) {
+                let (last, count) = &mut met[*node as usize];
+                *count += usize::from(*last != cluster);
+                *last = cluster;
+            }
+        }
+    }
+    let foreign = met.iter().map(|(_, count)| count.saturating_sub(1));
+    Sharing { foreign: foreign.clone().sum(), shared: foreign.filter(|n| *n > 0).count() }
+}
+
+/// The place of each node where they are numbered as the clusters of a body, one batch after the other, first meet them;
+/// nodes of no element are the last.
+pub fn node_places(body: &Body) -> Vec<u32> {
+    const NONE: u32 = u32::MAX;
+    let mut places = vec![NONE; body.masses.len()];
+    let nodes = body.batches.iter().flat_map(|b| &b.elements).flat_map(|e| &body.elements[*e as usize]);
+    let mut met = 0;
+    for node in nodes.copied().chain(0..body.masses.len() as u32) {
+        let place = &mut places[node as usize];
+        if *place == NONE {
+            *place = met;
+            met += 1;
+        }
+    }
+    places
 }

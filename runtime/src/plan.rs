@@ -6,8 +6,9 @@ use tensormass_kernels::{ElementInfo, LawEntry, LawInfo};
 use crate::body::LawBatch;
 use crate::mesh::Quality;
 use crate::model::Model;
-use crate::order::cluster_nodes;
+use crate::order::{Sharing, sharing};
 use crate::scene::{Integrator, Precision, Scene};
+use crate::tangent::{self, Tangent};
 
 /// How buffers are laid out: they differ between the CPU and GPUs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,6 +30,8 @@ pub struct PlannedLaw {
     pub elements: usize,
     /// Constants stored: for each element, or once.
     pub per_element: bool,
+    /// How products with the tangent are computed; none where there are none.
+    pub tangent: Option<Tangent>,
     /// The kernels that will run, each with its operations an element.
     pub kernels: Vec<(&'static str, u32)>,
 }
@@ -73,17 +76,30 @@ pub fn precision_name(precision: Precision) -> &'static str {
 impl Plan {
     /// The plan of a scene on a CPU or a GPU.
     pub fn new(scene: &Scene, model: &Model, layout: Layout) -> Self {
+        let (tangents, _) = tangent::asked_for(scene, &model.body);
+        Self::with_tangents(scene, model, layout, &tangents)
+    }
+
+    /// The plan where products with the tangents of the laws are computed in these ways on a CPU.
+    pub fn with_tangents(scene: &Scene, model: &Model, layout: Layout, tangents: &[Tangent]) -> Self {
         let implicit = !scene.solver.integrator.is_explicit();
         let moves = scene.solver.integrator != Integrator::Static;
         // Static equilibrium has no damping.
         let viscous = moves && model.body.is_viscous();
         let proportional = moves && model.body.stiffness_damping > 0.0;
+        // GPUs store nothing.
+        let on_layout = |tangent: &Tangent| match layout {
+            Layout::Cpu => *tangent,
+            Layout::Gpu => Tangent::Recomputed,
+        };
+        let tangents: Vec<Option<Tangent>> = tangents.iter().map(|t| implicit.then(|| on_layout(t))).collect();
         let laws = model
             .body
             .batches
             .iter()
-            .map(|b| {
-                let mut law = law(b, layout, implicit, proportional);
+            .zip(&tangents)
+            .map(|(b, tangent)| {
+                let mut law = law(b, *tangent, proportional);
                 let damping = damping_kernels(b.law, b.element.info);
                 law.kernels.extend(damping.filter(|(name, _)| viscous && (implicit || *name == "damping")));
                 law
@@ -107,17 +123,19 @@ impl Plan {
                     Precision::F32 => 4,
                     Precision::F64 => 8,
                 };
-                // The nodes of clusters, of which each has a partial force, and a number both ways.
-                let clustered: usize = model.body.batches.iter().map(|b| cluster_nodes(&model.body, b)).sum();
+                // Each node has a partial force, and one for each cluster to which it is foreign; a number both ways, and
+                // where the numbers of a shared node are.
+                let Sharing { foreign, shared } = sharing(&model.body);
                 let of_points = |b: &LawBatch| b.elements.len() * b.element.info.points.len();
-                let stored: usize = model.body.batches.iter().map(|b| b.law.info.stored * of_points(b)).sum();
+                let storing = model.body.batches.iter().zip(&tangents).filter(|(_, t)| **t == Some(Tangent::Stored));
+                let stored: usize = storing.map(|(b, _)| b.law.info.stored * of_points(b)).sum();
                 vec![
                     ("element nodes", 2 * slots),
                     ("rest data", 10 * real * points),
                     ("material constants", real * constants),
-                    ("partial forces", 4 * real * clustered),
-                    ("nodes of clusters, slots of nodes", 8 * clustered + 4 * (nodes + 1)),
-                    ("stored tangent", if implicit { real * stored } else { 0 }),
+                    ("partial forces", 3 * real * (nodes + foreign)),
+                    ("nodes of clusters, slots of nodes", 8 * foreign + 12 * shared + 4 * nodes),
+                    ("stored tangent", real * stored),
                     ("state and work vectors", vectors * 3 * real * nodes),
                     ("consistent mass", (4 + real) * entries + 4 * rows),
                 ]
@@ -145,7 +163,8 @@ impl Plan {
             passes.push("elements: partial force differentials of the velocity, nodes: sum of slots");
         }
         if implicit {
-            if layout == Layout::Cpu && model.body.batches.iter().any(|b| b.law.info.stored > 0) {
+            let stores = |(b, t): (&LawBatch, &Option<Tangent>)| *t == Some(Tangent::Stored) && b.law.info.stored > 0;
+            if model.body.batches.iter().zip(&tangents).any(stores) {
                 passes.push("elements: what is stored of the tangent");
             }
             passes.push("elements: diagonal");
@@ -196,7 +215,7 @@ impl Plan {
                     l.kernels.iter().map(|(k, n)| ((*k).to_string(), json!(n))).collect();
                 json!({
                     "law": l.info.name, "element": l.element.name, "elements": l.elements, "constants_per_element": l.per_element,
-                    "operations_per_element": kernels, "reviewed": l.info.reviewed,
+                    "operations_per_element": kernels, "tangent": l.tangent, "reviewed": l.info.reviewed,
                 })
             })
             .collect();
@@ -244,26 +263,25 @@ fn damping_kernels(law: &LawEntry, element: &'static ElementInfo) -> impl Iterat
     kernels.into_iter().filter(move |_| linear.is_some())
 }
 
-fn law(batch: &LawBatch, layout: Layout, implicit: bool, proportional: bool) -> PlannedLaw {
+fn law(batch: &LawBatch, tangent: Option<Tangent>, proportional: bool) -> PlannedLaw {
     let (info, element) = (batch.law.info, batch.element.info);
     let point = |name: &str| point_operations(info, name);
     let gathers = if info.structure.linear { 1 } else { 2 };
     let mut kernels = vec![("force", operations(element, 1, point("force") + element.contract_operations))];
-    // On a CPU what does not depend on the increment is computed once, and stored if it is anything.
-    let stores = implicit && layout == Layout::Cpu;
-    if stores && info.stored > 0 {
-        kernels.push(("linearize", operations(element, 1, point("linearize"))));
-    }
-    if stores {
+    // What does not depend on the increment is computed once, and stored if it is anything.
+    if tangent == Some(Tangent::Stored) {
+        if info.stored > 0 {
+            kernels.push(("linearize", operations(element, 1, point("linearize"))));
+        }
         kernels.push(("apply", operations(element, 1, tangent_operations(info) + element.contract_operations)));
     }
-    if (implicit && !stores) || proportional {
+    if tangent == Some(Tangent::Recomputed) || proportional {
         kernels.push(("dforce", operations(element, gathers, point("dforce") + element.contract_operations)));
     }
-    if implicit {
+    if tangent.is_some() {
         kernels.push(("diagonal", operations(element, 1, element.nodes as u32 * point("diagonal"))));
     }
-    PlannedLaw { info, element, elements: batch.elements.len(), per_element: batch.per_element, kernels }
+    PlannedLaw { info, element, elements: batch.elements.len(), per_element: batch.per_element, tangent, kernels }
 }
 
 fn scope(scene: &Scene, model: &Model, implicit: bool) -> (Vec<String>, Vec<String>) {

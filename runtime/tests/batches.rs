@@ -46,6 +46,7 @@ struct Swing {
     precision: &'static str,
     threads: u32,
     steps: u32,
+    tangent: &'static str,
 }
 
 const SWING: Swing = Swing {
@@ -57,11 +58,12 @@ const SWING: Swing = Swing {
     precision: "f64",
     threads: 1,
     steps: 5,
+    tangent: "auto",
 };
 
 impl Swing {
     fn scene(&self) -> Scene {
-        let Swing { length, stress, origin, cells, integrator, precision, threads, steps } = self;
+        let Swing { length, stress, origin, cells, integrator, precision, threads, steps, tangent } = self;
         let slabs: Vec<(&str, f64)> = laws().iter().map(|l| (l.info.name, 1e6 * stress)).collect();
         // Selections by x count from the end.
         let time = length / stress.sqrt();
@@ -85,6 +87,7 @@ value = [{:?}, {:?}, {:?}]
 integrator = "{integrator}"
 precision = "{precision}"
 threads = {threads}
+cg = {{ tangent = "{tangent}" }}
 step = {step:?}
 duration = {:?}
 [[probe]]
@@ -154,6 +157,14 @@ fn threads_change_nothing() {
     }
 }
 
+/// What is stored of tangents is what is computed anew, whichever is measured to be faster.
+#[test]
+fn tangents_change_nothing() {
+    for tangent in ["recomputed", "measured"] {
+        check("tangents", &Swing { tangent: "stored", ..SWING }, &Swing { tangent, ..SWING });
+    }
+}
+
 #[test]
 fn reruns_change_nothing() {
     check("a rerun", &SWING, &SWING);
@@ -180,12 +191,12 @@ fn place_changes_nothing() {
 fn forces(model: &Model, u: &[[f64; 3]]) -> (Vec<[f64; 3]>, Vec<f64>, Vec<[f64; 9]>) {
     let scaled: Vec<[f64; 3]> = u.iter().map(|u| u.map(|x| x / model.scale.length)).collect();
     let mut system = system::<f64>(model.body.clone());
-    let mut f = system.backend.zeros();
+    let (scaled, mut f) = (system.backend.upload(&scaled), system.backend.zeros());
     system.field.add_force(&system.backend, &scaled, &mut f).unwrap_or_else(|e| panic!("{e}"));
     let (force, energy, stress) = (model.scale.force(), model.scale.energy(), model.scale.stress);
     let energies = system.field.element_energies(&system.backend, &scaled).unwrap_or_else(|e| panic!("{e}"));
     (
-        f.iter().map(|f| f.map(|x| x * force)).collect(),
+        system.backend.download(&f).iter().map(|f| f.map(|x| x * force)).collect(),
         energies.iter().map(|w| w * energy).collect(),
         system.field.cauchy(&system.backend, &scaled).iter().map(|s| s.map(|x| x * stress)).collect(),
     )
@@ -230,8 +241,10 @@ fn check_slabs(slabs: &[(&str, f64)]) {
         };
         body.batches[0].elements.retain(|e| place(e) == i);
         let mut system = system::<f64>(body);
-        system.field.add_force(&system.backend, &u, &mut sum).unwrap_or_else(|e| panic!("{e}"));
-        largest = largest.max(system.backend.max_abs(&sum));
+        let (u, mut f) = (system.backend.upload(&u), system.backend.upload(&sum));
+        system.field.add_force(&system.backend, &u, &mut f).unwrap_or_else(|e| panic!("{e}"));
+        largest = largest.max(system.backend.max_abs(&f));
+        sum = system.backend.download(&f);
     }
     for (n, (f, s)) in f.iter().zip(&sum).enumerate() {
         // The order of at most 24 sums differs.

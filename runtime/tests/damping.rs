@@ -3,7 +3,7 @@
 
 mod support;
 
-use support::{Cpu, Random, body, done, parameters, probe, relative, system, viscous};
+use support::{Cpu, Random, at_node, body, done, parameters, probe, relative, system, viscous};
 use tensormass_runtime::LawEntry;
 use tensormass_runtime::backend::{Backend, ForceField};
 use tensormass_runtime::cg::CgLimits;
@@ -63,8 +63,7 @@ fn one_element(law: &'static LawEntry, parameters: &[f64], free: u8) -> Cpu<f64>
 
 /// Mass, stiffness and viscosity of the one degree of freedom, at rest.
 fn oscillator(system: &mut Cpu<f64>) -> [f64; 3] {
-    let (rest, mut unit) = (system.backend.zeros(), system.backend.zeros());
-    unit[3][0] = 1.0;
+    let (rest, unit) = (system.backend.zeros(), at_node(&system.backend, 3, [1.0, 0.0, 0.0]));
     let mut product = |viscosity: bool| {
         let mut f = system.backend.zeros();
         if viscosity {
@@ -72,7 +71,7 @@ fn oscillator(system: &mut Cpu<f64>) -> [f64; 3] {
         } else {
             system.field.add_dforce_at(&system.backend, &rest, &unit, -1.0, &mut f);
         }
-        f[3][0]
+        system.backend.download(&f)[3][0]
     };
     let (k, c) = (product(false), product(true));
     [system.body.masses[3], k, c]
@@ -117,12 +116,14 @@ fn one_mode(law: &'static LawEntry, viscosity: f64, alpha: f64, beta: f64) {
         let wanted = recurrence(integrator, start, (omega * h, alpha, coefficient), 25);
         for newton in [1, 30] {
             let mut state = system.initial_state([0.0; 3]);
-            (state.u[3][0], state.v[3][0]) = (start[0], start[1] * omega);
+            state.u = at_node(&system.backend, 3, [start[0], 0.0, 0.0]);
+            state.v = at_node(&system.backend, 3, [start[1] * omega, 0.0, 0.0]);
             let mut stepper = stepper(integrator, &system, newton);
             for (step, [u, v]) in wanted.iter().enumerate() {
                 advance(&mut system, &mut stepper, &mut state, h);
                 let what = format!("{}, {integrator}, newton {newton}, step {step}", law.info.name);
-                let error = (state.u[3][0] - u).hypot(state.v[3][0] / omega - v) / 1e-10;
+                let [found_u, found_v] = [&state.u, &state.v].map(|x| system.backend.download(x)[3][0]);
+                let error = (found_u - u).hypot(found_v / omega - v) / 1e-10;
                 // Relative to the start: what is left of it after the damping is told apart from 0.
                 assert!(error <= 1e-8 && u.hypot(*v) > 1e-12, "{what}: off by {error:.1e}");
             }
@@ -158,13 +159,13 @@ fn modes_decay_as_their_damping_ratio_says() {
         let (h, xi) = (1e-3 / omega, 0.05);
         (system.body.mass_damping, system.body.stiffness_damping) = (0.6 * xi * omega, 1.4 * xi / omega);
         let mut state = system.initial_state([0.0; 3]);
-        state.u[3][0] = 1e-3;
+        state.u = at_node(&system.backend, 3, [1e-3, 0.0, 0.0]);
         let mut stepper = stepper(integrator, &system, 1);
         let steps = 10_000;
         (0..steps).for_each(|_| advance(&mut system, &mut stepper, &mut state, h));
         let (t, damped) = (h * steps as f64, omega * (1.0 - xi * xi).sqrt());
         // u = A exp(-xi omega t) cos(..): the amplitude from u and v.
-        let (u, v) = (state.u[3][0], state.v[3][0]);
+        let [u, v] = [&state.u, &state.v].map(|x| system.backend.download(x)[3][0]);
         let amplitude = u.hypot((v + xi * omega * u) / damped);
         let start = 1e-3_f64.hypot(xi * omega * 1e-3 / damped);
         let decay = -(amplitude / start).ln() / (xi * omega * t);
@@ -237,7 +238,8 @@ fn critical_steps_of_a_viscous_beam() {
                 let mut system = make();
                 let mut random = Random(3);
                 let mut state = system.initial_state([0.0; 3]);
-                state.v.iter_mut().for_each(|v| *v = random.vector(1e-9));
+                let noise: Vector = mesh.nodes().iter().map(|_| random.vector(1e-9)).collect();
+                state.v = system.backend.upload(&noise);
                 let mut stepper = stepper("semi-implicit-euler", &system, 1);
                 (0..2000).for_each(|_| {
                     let small = system.backend.max_abs(&state.v) < 1e-3;
@@ -266,10 +268,12 @@ fn newton_solves_the_damped_step() {
         let (alpha, beta) = (system.body.mass_damping, system.body.stiffness_damping);
         let mut random = Random(5);
         let mut state = system.initial_state([0.0; 3]);
-        for (u, v) in state.u[4..].iter_mut().zip(&mut state.v[4..]) {
+        let [mut u, mut v] = [&state.u, &state.v].map(|x| system.backend.download(x));
+        for (u, v) in u[4..].iter_mut().zip(&mut v[4..]) {
             (*u, *v) = (random.vector(0.04), random.vector(0.05 / h));
         }
-        let (u, v) = (state.u.clone(), state.v.clone());
+        let u = system.backend.upload(&u);
+        (state.u, state.v) = (u.clone(), system.backend.upload(&v));
         let mut stepper = stepper("implicit-euler", &system, 30);
         let report = stepper.step(&mut system, &mut state, h).unwrap_or_else(|e| panic!("{}: {e}", law.info.name));
         let mut f = system.backend.zeros();
@@ -278,11 +282,12 @@ fn newton_solves_the_damped_step() {
         let mut damping = system.backend.zeros();
         system.add_damping(&u, &state.v, &mut damping);
         let scale = elastic + system.backend.max_abs(&damping);
+        let [f, damping, after] = [&f, &damping, &state.v].map(|x| system.backend.download(x));
         let mut worst = 0.0_f64;
         for n in 4..v.len() {
             for c in 0..3 {
                 let m = system.body.masses[n];
-                let inertia = m * (state.v[n][c] - v[n][c]) / h + alpha * m * state.v[n][c];
+                let inertia = m * (after[n][c] - v[n][c]) / h + alpha * m * after[n][c];
                 worst = worst.max((f[n][c] + damping[n][c] - inertia).abs());
             }
         }
@@ -308,9 +313,10 @@ fn rotation_is_free() {
         });
         let velocity: Vector = velocity.collect();
         let noise: Vector = turned.iter().map(|_| random.vector(2.0)).collect();
+        let turned = system.backend.upload(&turned);
         let mut force = |v: &Vector| {
-            let mut f = system.backend.zeros();
-            system.add_damping(&turned, v, &mut f);
+            let (v, mut f) = (system.backend.upload(v), system.backend.zeros());
+            system.add_damping(&turned, &v, &mut f);
             system.backend.max_abs(&f)
         };
         let (of_rotation, of_noise) = (force(&velocity), force(&noise));

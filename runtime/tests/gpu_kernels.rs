@@ -36,7 +36,8 @@ struct On<B: Backend, F: ForceField<B>> {
 }
 
 fn on_cpu(body: &Body) -> On<CpuBackend<f64>, CpuField<f64>> {
-    On { backend: CpuBackend::new(body.masses.len(), body.constraints.clone()), field: CpuField::new(body) }
+    let backend = CpuBackend::new(body);
+    On { field: CpuField::new(&backend, body), backend }
 }
 
 fn on_gpu(gpu: &Arc<Gpu>, body: &Body, options: GpuOptions) -> On<GpuBackend, GpuField> {

@@ -2,7 +2,7 @@
 
 mod support;
 
-use support::{Cpu, Random, body, case, done, number, parameters, probe, relative, scene, system};
+use support::{Cpu, Random, at_node, body, case, done, number, parameters, probe, relative, scene, system};
 use tensormass_runtime::LawEntry;
 use tensormass_runtime::backend::{Backend, ForceField};
 use tensormass_runtime::cg::CgLimits;
@@ -63,11 +63,12 @@ fn transition(integrator: &str, omega_h: f64, alpha_h: f64) -> [[f64; 2]; 2] {
         let omega = 2.0 / critical(&mut system);
         system.body.mass_damping = alpha_h * omega / omega_h;
         let mut state = system.initial_state([0.0; 3]);
-        state.u[3][0] = start[0];
-        state.v[3][0] = start[1] * omega;
+        state.u = at_node(&system.backend, 3, [start[0], 0.0, 0.0]);
+        state.v = at_node(&system.backend, 3, [start[1] * omega, 0.0, 0.0]);
         let mut stepper = stepper(integrator, &system);
         advance(&mut system, &mut stepper, &mut state, omega_h / omega, 1);
-        *column = [state.u[3][0], state.v[3][0] / omega];
+        let [u, v] = [&state.u, &state.v].map(|x| system.backend.download(x)[3][0]);
+        *column = [u, v / omega];
     }
     let [a, b] = columns;
     [[a[0], b[0]], [a[1], b[1]]]
@@ -206,10 +207,10 @@ fn order_in_time() {
                 let speed = 0.1 / (64.0 * h);
                 let mut state = system.initial_state([0.5 * speed, -0.3 * speed, speed]);
                 // From rest at u = 0 semi-implicit Euler would be a central difference.
-                state.u[3] = [0.05, -0.02, 0.03];
+                state.u = at_node(&system.backend, 3, [0.05, -0.02, 0.03]);
                 let mut stepper = stepper(integrator, &system);
                 advance(&mut system, &mut stepper, &mut state, h / division as f64, 192 * division);
-                state.u[3]
+                system.backend.download(&state.u)[3]
             };
             let (a, b, c) = (end(1), end(2), end(4));
             let distance = |p: [f64; 3], q: [f64; 3]| (0..3).map(|i| (p[i] - q[i]).powi(2)).sum::<f64>().sqrt();
@@ -271,17 +272,20 @@ fn momentum_of_a_free_body() {
             let seed = 7;
             let mut random = Random(seed);
             let mut state = system.initial_state([3.0, -2.0, 1.0]);
-            for (v, x) in state.v.iter_mut().zip(mesh.nodes()) {
+            let mut v = system.backend.download(&state.v);
+            for (v, x) in v.iter_mut().zip(mesh.nodes()) {
                 let noise = random.vector(1.0);
                 let spin = [-5.0 * x[1], 5.0 * x[0], 0.0];
                 *v = std::array::from_fn(|c| v[c] + spin[c] + noise[c]);
             }
+            state.v = system.backend.upload(&v);
             let masses = system.body.masses.clone();
-            let momenta = |state: &State<CpuBackend<f64>>| {
+            let momenta = |backend: &CpuBackend<f64>, state: &State<CpuBackend<f64>>| {
+                let [u, v] = [&state.u, &state.v].map(|x| backend.download(x));
                 let (mut p, mut l, mut size) = ([0.0; 3], [0.0; 3], 0.0_f64);
                 for (i, m) in masses.iter().enumerate() {
-                    let x: [f64; 3] = std::array::from_fn(|c| mesh.nodes()[i][c] + state.u[i][c]);
-                    let v = state.v[i];
+                    let x: [f64; 3] = std::array::from_fn(|c| mesh.nodes()[i][c] + u[i][c]);
+                    let v = v[i];
                     for c in 0..3 {
                         p[c] += m * v[c];
                         l[c] += m * (x[(c + 1) % 3] * v[(c + 2) % 3] - x[(c + 2) % 3] * v[(c + 1) % 3]);
@@ -290,11 +294,11 @@ fn momentum_of_a_free_body() {
                 }
                 (p, l, size)
             };
-            let (p0, l0, size) = momenta(&state);
+            let (p0, l0, size) = momenta(&system.backend, &state);
             let bound = 16.0 * STEPS as f64 * f64::EPSILON * size;
             let mut stepper = stepper(integrator, &system);
             advance(&mut system, &mut stepper, &mut state, h, STEPS);
-            let (p, l, _) = momenta(&state);
+            let (p, l, _) = momenta(&system.backend, &state);
             for c in 0..3 {
                 let name = format!("{}, {integrator}, seed {seed}, component {c}", law.info.name);
                 assert!((p[c] - p0[c]).abs() <= bound, "{name}: {} of {}", p[c] - p0[c], p0[c]);
@@ -348,9 +352,9 @@ fn energy_does_not_drift() {
         let seed = 11;
         let mut random = Random(seed);
         let mut state = system.initial_state([0.0; 3]);
-        for v in &mut state.v[4..] {
-            *v = random.vector(0.2);
-        }
+        let mut v = system.backend.download(&state.v);
+        v[4..].iter_mut().for_each(|v| *v = random.vector(0.2));
+        state.v = system.backend.upload(&v);
         let mut stepper = stepper("semi-implicit-euler", &system);
         let start = system.kinetic_energy(&state.v);
         // A law may have an energy at rest.

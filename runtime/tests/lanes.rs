@@ -12,7 +12,7 @@ use support::{Random, body, parameters};
 use tensormass_kernels::{ElementEntry, elements, laws};
 use tensormass_runtime::LawEntry;
 use tensormass_runtime::backend::{Backend, ForceField, LeftDomain};
-use tensormass_runtime::cpu::{CpuBackend, CpuField, Engine, Precision};
+use tensormass_runtime::cpu::{CpuBackend, CpuField, CpuVector, Engine, Precision};
 
 /// Roundings in a kernel's longest chain of operations, and what they may be magnified by at strains of a third: that of
 /// what cancels in stresses, a few times their size.
@@ -42,11 +42,11 @@ impl Case {
 
     /// What a field computes on some registers: vectors at the nodes, and energies.
     fn all<R: Precision>(&self, engine: Engine) -> Result<Vec<(&'static str, Vec<f64>)>, LeftDomain> {
-        let backend = CpuBackend::<R>::new(self.body.masses.len(), vec![]);
-        let mut field = CpuField::<R>::on(&self.body, engine);
+        let backend = CpuBackend::<R>::new(&self.body);
+        let mut field = CpuField::<R>::on(&backend, &self.body, engine);
         let [u, v, du] = self.vectors.each_ref().map(|x| backend.upload(x));
         let mut all = vec![];
-        let kept = |out: &mut Vec<[R; 3]>| {
+        let kept = |out: &mut CpuVector<R>| {
             let values = backend.download(out).as_flattened().to_vec();
             backend.clear(out);
             values

@@ -131,8 +131,8 @@ fn implicit_steps_solve_with_the_matrix() {
             let mut u = vec![[0.0; 3]; n];
             u[k / 3][k % 3] = 1.0;
             let mut f = system.backend.zeros();
-            system.field.add_dforce(&system.backend, &u, -1.0, &mut f);
-            DVector::from_column_slice(f.as_flattened())
+            system.field.add_dforce(&system.backend, &system.backend.upload(&u), -1.0, &mut f);
+            DVector::from_column_slice(system.backend.download(&f).as_flattened())
         };
         let stiffness = DMatrix::from_columns(&(0..3 * n).map(&mut column).collect::<Vec<_>>());
         let v = DVector::from_column_slice(velocity.as_flattened());

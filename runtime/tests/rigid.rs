@@ -7,8 +7,9 @@
 mod support;
 
 use nalgebra::{DMatrix, SymmetricEigen};
-use support::{Cpu, Random, body, parameters, system};
+use support::{Cpu, Random, at_node, body, parameters, system};
 use tensormass_runtime::backend::{Backend, ForceField};
+use tensormass_runtime::cpu::CpuVector;
 use tensormass_runtime::mesh::{Groups, Mesh, beam};
 use tensormass_runtime::{LawEntry, laws};
 
@@ -31,7 +32,7 @@ fn free(law: &'static LawEntry, random: &mut Random) -> Case {
     });
     let mesh = Mesh::tetrahedra(nodes.collect(), regular.tets().to_vec(), Groups::default()).expect("a valid mesh");
     let mut system = system::<f64>(body(&mesh, law, &parameters(law), &[]));
-    let rest = system.backend.zeros();
+    let rest = vec![[0.0; 3]; mesh.nodes().len()];
     let d = diagonal(&mut system, &rest);
     let stiffness = system.backend.max_abs(&d);
     Case { law, mesh, system, stiffness }
@@ -42,28 +43,30 @@ fn selects(law: &LawEntry) -> bool {
     law.info.operations.iter().any(|o| o.kernel == "dforce" && o.selects > 0)
 }
 
-fn force(system: &mut Cpu<f64>, u: &Vec<[f64; 3]>) -> Vec<[f64; 3]> {
-    let mut f = system.backend.zeros();
-    system.field.add_force(&system.backend, u, &mut f).unwrap_or_else(|e| panic!("{e}"));
+fn force(system: &mut Cpu<f64>, u: &[[f64; 3]]) -> CpuVector<f64> {
+    let (u, mut f) = (system.backend.upload(u), system.backend.zeros());
+    system.field.add_force(&system.backend, &u, &mut f).unwrap_or_else(|e| panic!("{e}"));
     f
 }
 
-fn diagonal(system: &mut Cpu<f64>, u: &Vec<[f64; 3]>) -> Vec<[f64; 3]> {
-    let mut d = system.backend.zeros();
-    system.field.prepare(&system.backend, u);
+fn diagonal(system: &mut Cpu<f64>, u: &[[f64; 3]]) -> CpuVector<f64> {
+    let (u, mut d) = (system.backend.upload(u), system.backend.zeros());
+    system.field.prepare(&system.backend, &u);
     system.field.add_diagonal(&system.backend, 1.0, &mut d);
     d
 }
 
 /// K = -df/du at u, column by column.
-fn tangent(system: &mut Cpu<f64>, u: &Vec<[f64; 3]>) -> DMatrix<f64> {
+fn tangent(system: &mut Cpu<f64>, u: &[[f64; 3]]) -> DMatrix<f64> {
     let size = 3 * u.len();
     let mut k = DMatrix::zeros(size, size);
-    system.field.prepare(&system.backend, u);
+    system.field.prepare(&system.backend, &system.backend.upload(u));
     for column in 0..size {
-        let (mut du, mut df) = (system.backend.zeros(), system.backend.zeros());
-        du[column / 3][column % 3] = 1.0;
+        let mut unit = [0.0; 3];
+        unit[column % 3] = 1.0;
+        let (du, mut df) = (at_node(&system.backend, column / 3, unit), system.backend.zeros());
         system.field.add_dforce(&system.backend, &du, -1.0, &mut df);
+        let df = system.backend.download(&df);
         for row in 0..size {
             k[(row, column)] = df[row / 3][row % 3];
         }
@@ -139,6 +142,7 @@ fn forces_balance() {
         let u = deformed(case, random);
         let f = force(&mut case.system, &u);
         let size = case.system.backend.max_abs(&f);
+        let f = case.system.backend.download(&f);
         within("1e-3 over the force", 1e-3 * case.stiffness * 0.1 / size, 1.0)?;
         let bound = BOUND * case.stiffness * f.len() as f64;
         for c in 0..3 {
@@ -159,7 +163,7 @@ fn forces_balance() {
 #[test]
 fn six_rigid_modes() {
     check(|_, case, _| {
-        let rest = case.system.backend.zeros();
+        let rest = vec![[0.0; 3]; case.mesh.nodes().len()];
         let k = tangent(&mut case.system, &rest);
         let mut values: Vec<f64> = SymmetricEigen::new(k).eigenvalues.iter().copied().collect();
         values.sort_by(f64::total_cmp);
@@ -176,10 +180,11 @@ fn six_rigid_modes() {
 fn tangent_is_symmetric_and_has_its_diagonal() {
     check(|_, case, random| {
         for at_rest in [true, false] {
-            let u = if at_rest { case.system.backend.zeros() } else { deformed(case, random) };
+            let u = if at_rest { vec![[0.0; 3]; case.mesh.nodes().len()] } else { deformed(case, random) };
             let k = tangent(&mut case.system, &u);
             within("K - K'", (&k - k.transpose()).amax(), BOUND * case.stiffness)?;
             let d = diagonal(&mut case.system, &u);
+            let d = case.system.backend.download(&d);
             let off = d.as_flattened().iter().enumerate().map(|(i, d)| (d - k[(i, i)]).abs()).fold(0.0, f64::max);
             within("diagonal", off, BOUND * case.stiffness)?;
             // A law that selects may have a kink at rest, where no difference finds the one-sided tangent.
@@ -192,6 +197,7 @@ fn tangent_is_symmetric_and_has_its_diagonal() {
                 u.iter().zip(&direction).map(|(u, d)| std::array::from_fn(|c| u[c] + sign * step * d[c])).collect()
             };
             let (after, before) = (force(&mut case.system, &at(1.0)), force(&mut case.system, &at(-1.0)));
+            let [after, before] = [after, before].map(|f| case.system.backend.download(&f));
             let du = nalgebra::DVector::from_column_slice(direction.as_flattened());
             let df = k * du;
             let slope = |i: usize| (before.as_flattened()[i] - after.as_flattened()[i]) / (2.0 * step);

@@ -7,7 +7,8 @@ use serde_json::{Value, json};
 use tensormass_runtime::measure::{Bench, Subject};
 use tensormass_runtime::target::Target;
 
-use super::{as_json, failed};
+use super::failed;
+use super::report::as_json;
 use crate::failure::Failure;
 use crate::text;
 

@@ -160,7 +160,7 @@ pub fn element_module(element: &ElementKernels) -> TokenStream {
             impl ::tensormass_kernels::Element for Element {
                 type Nodal<R: Real> = [[R; 3]; #nodes];
                 fn info() -> &'static ::tensormass_kernels::ElementInfo { &INFO }
-                fn nodal<R: Real>() -> [[R; 3]; #nodes] { [[R::from_f64(0.0); 3]; #nodes] }
+                fn nodal<R: Real>() -> [[R; 3]; #nodes] { [[R::from_f64(-0.0); 3]; #nodes] }
                 #[inline(always)]
                 fn gradient<R: Real>(u: &[[R; 3]; #nodes], slopes: &[R], inverse_jacobian: &[R; 9]) -> [R; 9] { #gradient }
                 #[inline(always)]

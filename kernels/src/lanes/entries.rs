@@ -4,7 +4,7 @@
 //! in. A closure or a function in between would be compiled for any machine, and call every instruction.
 #![allow(unsafe_code)]
 
-use super::{Lanes, Node};
+use super::{Lanes, Node, chains};
 use crate::damping::Dissipative;
 use crate::element::{self, Element, ElementKernels, Elements};
 use crate::law::Law;
@@ -18,6 +18,8 @@ pub trait Entries: Lanes {
     fn dampers<L: Dissipative>() -> DampingPointKernels<Self>;
     /// An element's kernels.
     fn elements<E: Element>() -> ElementKernels<Self>;
+    /// See [`chains::chains`].
+    fn chains() -> fn(usize) -> Self::Scalar;
 }
 
 macro_rules! entry {
@@ -76,10 +78,16 @@ macro_rules! entries {
                 }
             }
 
+            fn chains() -> fn(usize) -> $scalar {
+                entry!([$($feature)?], $lanes, chains::chains<>(rounds: usize) -> $scalar)
+            }
+
             fn elements<E: Element>() -> ElementKernels<Self> {
                 ElementKernels {
                     gradient: entry!([$($feature)?], $lanes, element::gradient<E: Element>(
-                        elements: &Elements<$lanes>, u: &[Node<$scalar>], out: &mut [[$lanes; 9]])),
+                        elements: &Elements<$lanes>, u: [&[Node<$scalar>]; 1], out: [&mut [[$lanes; 9]]; 1])),
+                    gradients: entry!([$($feature)?], $lanes, element::gradients<E: Element>(
+                        elements: &Elements<$lanes>, u: [&[Node<$scalar>]; 2], out: [&mut [[$lanes; 9]]; 2])),
                     contract: entry!([$($feature)?], $lanes, element::contract<E: Element>(
                         elements: &Elements<$lanes>, stress: &[[$lanes; 9]], f: &mut [Node<$scalar>])),
                     node_gradients: entry!([$($feature)?], $lanes, element::node_gradients<E: Element>(

@@ -5,12 +5,14 @@
 //! compiled into functions of its own (`entries`), because an intrinsic outside of such a function is a call.
 #![allow(unsafe_code)]
 
+mod chains;
 mod entries;
 mod functions;
 mod scalar;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
+pub use chains::Chains;
 pub use entries::Entries;
 #[cfg(target_arch = "x86_64")]
 pub use x86::{Avx2, Avx512, F32x8, F32x16, F64x4, F64x8};

@@ -1,40 +1,50 @@
 //! A cluster of elements on the CPU: its nodes, copied from and added to those of the body.
+//!
+//! The backend numbers nodes as clusters first meet them ([`crate::order::node_places`]): those that a cluster meets first,
+//! its own, follow each other, and so do those of one cluster after the other. The others are foreign to it.
 
-use tensormass_kernels::{Blocks, Cluster as Elements, Compute, RestPoint, States};
+use std::ops::Range;
+
+use tensormass_kernels::{Blocks, Cluster as Elements, Compute, Node, RestPoint};
 
 use super::Precision;
 use crate::body::{Body, LawBatch};
 
 /// Elements of one law and kind that are near each other.
-pub(super) struct Cluster<R> {
-    /// The elements.
-    pub blocks: Blocks<R>,
+pub(super) struct Cluster {
     /// The mesh's number of each.
     pub elements: Vec<u32>,
-    /// The body's number of each node of the cluster.
-    pub nodes: Vec<u32>,
-    /// What products with the tangent need of a state; none before they are asked for.
-    pub states: Option<States<R>>,
+    /// The places of its own nodes.
+    pub own: Range<usize>,
+    /// The places of the others, ascending.
+    pub foreign: Vec<u32>,
 }
 
-impl<R: Precision> Cluster<R> {
-    /// Some elements of a batch, by their places in it.
-    pub fn new(body: &Body, batch: &LawBatch, range: std::ops::Range<usize>, compute: &dyn Compute<R>) -> Self {
-        let (info, count) = (batch.element.info, batch.law.info.constants.len());
-        let order = interleaved(range.clone(), compute.lanes());
-        // Nodes are numbered as the elements in their own order meet them.
-        let mut numbers = std::collections::HashMap::new();
-        let mut nodes = vec![];
-        for e in range.clone() {
-            for &n in &body.elements[batch.elements[e] as usize] {
-                numbers.entry(n).or_insert_with(|| {
-                    nodes.push(n);
-                    nodes.len() as u32 - 1
-                });
-            }
-        }
+impl Cluster {
+    /// Some elements of a batch, by their places in it: those of a cluster of `blocks`, which are filled. The first nodes,
+    /// so many, are those of clusters before.
+    pub fn new<R: Precision>(
+        (body, batch, places): (&Body, &LawBatch, &[u32]),
+        range: Range<usize>,
+        met: usize,
+        (blocks, number): (&mut Blocks<R>, usize),
+        compute: &dyn Compute<R>,
+    ) -> Self {
+        let count = batch.law.info.constants.len();
+        let order = interleaved(range, compute.lanes());
         let elements: Vec<u32> = order.iter().map(|e| batch.elements[*e]).collect();
-        let local: Vec<u32> = elements.iter().flat_map(|e| &body.elements[*e as usize]).map(|n| numbers[n]).collect();
+        let nodes = |e: &u32| body.elements[*e as usize].iter().map(|n| places[*n as usize]);
+        let mut all: Vec<u32> = elements.iter().flat_map(nodes).collect();
+        all.sort_unstable();
+        all.dedup();
+        let foreign: Vec<u32> = all[..all.partition_point(|n| (*n as usize) < met)].to_vec();
+        let own = met..met + all.len() - foreign.len();
+        // Within a cluster its own come first.
+        let local = |n: u32| match (n as usize).checked_sub(met) {
+            Some(own) => own as u32,
+            None => (own.len() + foreign.partition_point(|f| *f < n)) as u32,
+        };
+        let nodes: Vec<u32> = elements.iter().flat_map(nodes).map(local).collect();
         let round = |x: f64| R::from_f64(x);
         let rest = elements.iter().flat_map(|e| &body.rest[*e as usize]);
         let rest: Vec<RestPoint<R>> = rest
@@ -44,15 +54,51 @@ impl<R: Precision> Cluster<R> {
             true => order.iter().flat_map(|e| &batch.constants[e * count..][..count]).map(|c| round(*c)).collect(),
             false => batch.constants.iter().map(|c| round(*c)).collect(),
         };
-        let given = Elements { nodes: &local, rest: &rest, constants: &constants, per_element: batch.per_element };
-        let blocks = Blocks::new(compute.lanes(), [info.nodes, info.points.len(), count], &given);
-        Self { blocks, elements, nodes, states: None }
+        blocks.fill(number, &Elements { nodes: &nodes, rest: &rest, constants: &constants });
+        Self { elements, own, foreign }
+    }
+
+    /// Nodes.
+    pub fn nodes(&self) -> usize {
+        self.own.len() + self.foreign.len()
+    }
+
+    /// Copies the vectors of its nodes.
+    pub fn copy<R: Precision>(&self, from: &[[R; 3]], to: &mut [Node<R>]) {
+        let (own, foreign) = to.split_at_mut(self.own.len());
+        let after = from.len().min(self.own.end + 1);
+        let numbers = from[self.own.start..after].as_flattened();
+        own.iter_mut().enumerate().for_each(|(n, to)| four(numbers, n, to));
+        foreign.iter_mut().zip(&self.foreign).for_each(|(to, n)| four(from.as_flattened(), *n as usize, to));
+    }
+
+    /// Leaves what was added to its nodes where pass 2 finds it.
+    pub fn leave<R: Precision>(&self, from: &[Node<R>], own: &mut [[R; 3]], foreign: &mut [[R; 3]]) {
+        let (from_own, from_foreign) = from.split_at(self.own.len());
+        for (to, from) in [(own, from_own), (foreign, from_foreign)] {
+            let from = &from[..to.len()];
+            let to = to.as_flattened_mut();
+            from.iter().enumerate().for_each(|(n, from)| match to.get_mut(3 * n..3 * n + 4) {
+                // What is too much is written over by the next.
+                Some(four) => four.copy_from_slice(from),
+                None => to[3 * n..].copy_from_slice(&from[..3]),
+            });
+        }
+    }
+}
+
+/// Copies the numbers of a node, four at once where four are left: the last one pads the node, and is not looked at.
+#[inline(always)]
+fn four<R: Copy>(numbers: &[R], node: usize, to: &mut Node<R>) {
+    match numbers.get(3 * node..3 * node + 4) {
+        Some(four) => to.copy_from_slice(four),
+        None => to[..3].copy_from_slice(&numbers[3 * node..]),
     }
 }
 
 /// A range in which places that follow each other are far apart in whole blocks: the elements of a block share no nodes, as
 /// far as can be, and one addition to a node need not wait for another.
-fn interleaved(range: std::ops::Range<usize>, lanes: usize) -> Vec<usize> {
+fn interleaved(range: Range<usize>, lanes: usize) -> Vec<usize> {
     let blocks = range.len() / lanes;
     let whole = (0..blocks * lanes).map(|k| range.start + k % lanes * blocks + k / lanes);
     whole.chain(range.start + blocks * lanes..range.end).collect()

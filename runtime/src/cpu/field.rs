@@ -1,41 +1,61 @@
 //! The elements of a body on the CPU, a cluster at a time, in two passes (after Faure et al. 2012, Algorithm 1).
 //!
 //! Pass 1 runs over clusters: it copies the vectors of a cluster's nodes, and adds the forces of its elements, in their
-//! order, into a slot for each of these nodes. Pass 2 runs over the nodes of the body and sums their slots in ascending
-//! order. A node has as many slots as clusters share it: most have one, where the paper has one for each element. No two
-//! threads write one place, and no sum depends on the thread count.
+//! order. What it adds to its own nodes it leaves where the sums begin, what to foreign ones in a slot for each. Pass 2 runs
+//! over the nodes of the body and sums their slots in ascending order. A node has as many partial forces as clusters share
+//! it: most have one, where the paper has one for each element. No two threads write one place, and no sum depends on the
+//! thread count.
+
+use std::ops::Range;
 
 use rayon::prelude::*;
-use tensormass_kernels::{Blocks, Compute, Engine, Node, compose, copy_nodes};
+use tensormass_kernels::{Blocks, Compute, Engine, Node, Part, States, compose};
 
 use super::cluster::Cluster;
-use super::vectors::{BLOCK, exact_dot};
+use super::vectors::{BLOCK, CpuVector, exact_dot};
 use super::{CpuBackend, Precision};
 use crate::backend::{Backend, ForceField, LeftDomain, Operator, REGISTERS, RUNNING, SUM};
 use crate::body::{Body, LawBatch};
-use crate::mesh::{Incidence, NodeId};
+use crate::mesh::Incidence;
 use crate::order::cluster_size;
+use crate::tangent::{self, Tangent};
 
 /// The elements of one law and kind.
 struct CpuBatch<R: Precision> {
     law: &'static str,
     domain: &'static str,
     compute: Box<dyn Compute<R>>,
-    clusters: Vec<Cluster<R>>,
+    clusters: Vec<Cluster>,
+    blocks: Blocks<R>,
+    /// How products with the tangent are computed.
+    tangent: Tangent,
+    /// What they need of a state, where it is stored; none before they are asked for.
+    states: Option<States<R>>,
 }
 
 impl<R: Precision> CpuBatch<R> {
-    fn new(body: &Body, batch: &LawBatch, engine: Engine) -> Self {
+    /// A batch whose first nodes, so many, are those of batches before it.
+    fn new(body: &Body, batch: &LawBatch, places: &[u32], met: &mut usize, engine: Engine) -> Self {
+        let info = batch.element.info;
         let compute = compose::<R>(engine, batch.element, batch.law);
-        let (count, size) = (batch.elements.len(), cluster_size(batch.element.info.nodes, batch.elements.len()));
-        let ranges: Vec<usize> = (0..count).step_by(size).collect();
-        let cluster = |start: &usize| Cluster::new(body, batch, *start..count.min(start + size), &*compute);
-        // One after the other: what is computed in turn lies in turn in memory, as far as the allocator has it.
+        let (count, size) = (batch.elements.len(), cluster_size(info.nodes, batch.elements.len()));
+        let ranges: Vec<_> = (0..count).step_by(size).map(|start| start..count.min(start + size)).collect();
+        let lens: Vec<usize> = ranges.iter().map(ExactSizeIterator::len).collect();
+        let shape = [info.nodes, info.points.len(), batch.law.info.constants.len()];
+        let mut blocks = Blocks::new(compute.lanes(), shape, batch.per_element, &lens);
+        let cluster = |(number, range)| {
+            let cluster = Cluster::new((body, batch, places), range, *met, (&mut blocks, number), &*compute);
+            *met = cluster.own.end;
+            cluster
+        };
         Self {
             law: batch.law.info.name,
             domain: batch.law.info.domain.unwrap_or("everywhere"),
-            clusters: ranges.iter().map(cluster).collect(),
+            clusters: ranges.into_iter().enumerate().map(cluster).collect(),
+            blocks,
             compute,
+            tangent: Tangent::Stored,
+            states: None,
         }
     }
 
@@ -47,84 +67,127 @@ impl<R: Precision> CpuBatch<R> {
 /// The vectors of a cluster's nodes.
 type Vectors<'a, R, const N: usize> = [&'a [Node<R>]; N];
 
-/// Copies vectors of a cluster's nodes.
-fn local<'a, R: Precision, const N: usize>(
-    cluster: &Cluster<R>,
-    vectors: [&Vec<[R; 3]>; N],
-    room: &'a mut [Vec<Node<R>>; N],
-) -> Vectors<'a, R, N> {
-    vectors.iter().zip(room.iter_mut()).for_each(|(vector, room)| copy_nodes(vector, &cluster.nodes, room));
-    room.each_ref().map(Vec::as_slice)
+/// Room for vectors at the nodes of any cluster of a batch.
+struct Room<R, const N: usize>([Vec<Node<R>>; N]);
+
+impl<R: Precision, const N: usize> Room<R, N> {
+    fn new() -> Self {
+        Self(std::array::from_fn(|_| vec![]))
+    }
+
+    /// Vectors of zeros at the nodes of a cluster.
+    fn zeros(&mut self, blocks: &Blocks<R>, cluster: &Cluster) -> [&mut [Node<R>]; N] {
+        self.0.each_mut().map(|room| {
+            room.resize(blocks.reach(), [R::default(); 4]);
+            room[..cluster.nodes()].fill([R::default(); 4]);
+            room.as_mut_slice()
+        })
+    }
+
+    /// Copies of vectors at the nodes of a cluster.
+    fn copies(&mut self, blocks: &Blocks<R>, cluster: &Cluster, vectors: [&CpuVector<R>; N]) -> Vectors<'_, R, N> {
+        for (room, vector) in self.0.iter_mut().zip(vectors) {
+            room.resize(blocks.reach(), [R::default(); 4]);
+            cluster.copy(&vector.0, &mut room[..cluster.nodes()]);
+        }
+        self.0.each_ref().map(Vec::as_slice)
+    }
 }
 
 /// All elements of a body.
 pub struct CpuField<R: Precision> {
     batches: Vec<CpuBatch<R>>,
-    /// A partial force for each node of each cluster, batch after batch.
-    slots: Vec<Node<R>>,
-    /// Which slots belong to each node.
-    incidence: Incidence,
+    /// Of each node the partial force of the cluster that it belongs to.
+    own: Vec<[R; 3]>,
+    /// A partial force for each node that is foreign to a cluster, cluster after cluster.
+    foreign: Vec<[R; 3]>,
+    /// The nodes that have some of these, ascending, and where theirs begin and end in `slots`.
+    shared: Vec<(u32, Range<u32>)>,
+    /// Places in `foreign`, node after node, ascending.
+    slots: Vec<u32>,
     /// How many elements there are.
     elements: usize,
     /// The displacement at which the tangent is taken.
-    state: Vec<[R; 3]>,
+    state: CpuVector<R>,
     /// Whether what is stored of it is there.
     is_linearized: bool,
 }
 
 impl<R: Precision> CpuField<R> {
     /// The elements of a body, in clusters, on the widest registers of this machine.
-    pub fn new(body: &Body) -> Self {
-        Self::on(body, Engine::best())
+    pub fn new(backend: &CpuBackend<R>, body: &Body) -> Self {
+        Self::on(backend, body, Engine::best())
     }
 
     /// The elements of a body, in clusters.
-    pub fn on(body: &Body, engine: Engine) -> Self {
-        let batches: Vec<CpuBatch<R>> = body.batches.iter().map(|b| CpuBatch::new(body, b, engine)).collect();
+    pub fn on(backend: &CpuBackend<R>, body: &Body, engine: Engine) -> Self {
+        let mut met = 0;
+        let batch = |b| CpuBatch::new(body, b, backend.places(), &mut met, engine);
+        let batches: Vec<CpuBatch<R>> = body.batches.iter().map(batch).collect();
         let clusters = batches.iter().flat_map(|b| &b.clusters);
-        let slots = clusters.flat_map(|c| &c.nodes).map(|n| *n as usize);
-        let incidence = Incidence::of_slots(body.masses.len(), slots);
-        Self {
-            slots: vec![[R::default(); 4]; incidence.slots().len()],
+        let foreign = clusters.flat_map(|c| &c.foreign).map(|n| *n as usize);
+        let nodes = body.masses.len();
+        let incidence = Incidence::of_slots(nodes, foreign);
+        let ranges = incidence.offsets().windows(2).zip(0..).map(|(ends, node)| (node, ends[0]..ends[1]));
+        let field = Self {
+            own: vec![[R::default(); 3]; nodes],
+            foreign: vec![[R::default(); 3]; incidence.slots().len()],
+            shared: ranges.filter(|(_, slots)| !slots.is_empty()).collect(),
+            slots: incidence.slots().to_vec(),
             elements: body.elements.len(),
             batches,
-            incidence,
-            state: vec![[R::default(); 3]; body.masses.len()],
+            state: backend.zeros(),
             is_linearized: false,
-        }
+        };
+        field.with_tangents(&tangent::by_rule(body, size_of::<R>()))
     }
 
-    /// Pass 1: a kernel of every cluster into its slots.
+    /// Computes products with the tangent of each law in this way, instead of by the rule.
+    pub fn with_tangents(mut self, tangents: &[Tangent]) -> Self {
+        for (batch, tangent) in self.batches.iter_mut().zip(tangents) {
+            (batch.tangent, batch.states) = (*tangent, None);
+        }
+        self.is_linearized = false;
+        self
+    }
+
+    /// Pass 1: a kernel of every cluster, which adds to vectors of zeros.
     fn elements<const N: usize>(
         &mut self,
-        vectors: [&Vec<[R; 3]>; N],
-        kernel: impl Fn(&dyn Compute<R>, &Blocks<R>, Vectors<R, N>, &mut [Node<R>]) -> Option<usize> + Sync,
+        vectors: [&CpuVector<R>; N],
+        kernel: impl Fn(&dyn Compute<R>, Part<R>, Vectors<R, N>, &mut [Node<R>]) -> Option<usize> + Sync,
     ) -> Result<(), LeftDomain> {
-        self.pass(vectors, |batch, cluster, vectors, out| kernel(&*batch.compute, &cluster.blocks, vectors, out))
+        self.pass(vectors, |batch, part, vectors, out| kernel(&*batch.compute, part, vectors, out))
     }
 
     fn pass<const N: usize>(
         &mut self,
-        vectors: [&Vec<[R; 3]>; N],
-        kernel: impl Fn(&CpuBatch<R>, &Cluster<R>, Vectors<R, N>, &mut [Node<R>]) -> Option<usize> + Sync,
+        vectors: [&CpuVector<R>; N],
+        kernel: impl Fn(&CpuBatch<R>, Part<R>, Vectors<R, N>, &mut [Node<R>]) -> Option<usize> + Sync,
     ) -> Result<(), LeftDomain> {
-        let mut rest = self.slots.as_mut_slice();
+        let (mut own, mut foreign) = (self.own.as_mut_slice(), self.foreign.as_mut_slice());
         let mut tasks = vec![];
         for batch in &self.batches {
-            for cluster in &batch.clusters {
-                let (slots, others) = rest.split_at_mut(cluster.nodes.len());
-                rest = others;
-                tasks.push((batch, cluster, slots));
+            for (k, cluster) in batch.clusters.iter().enumerate() {
+                let (own_here, foreign_here);
+                (own_here, own) = own.split_at_mut(cluster.own.len());
+                (foreign_here, foreign) = foreign.split_at_mut(cluster.foreign.len());
+                tasks.push((batch, k, own_here, foreign_here));
             }
         }
-        let room = || std::array::from_fn(|_| vec![]);
         let outside = tasks
             .into_par_iter()
-            .map_init(room, |room: &mut [Vec<Node<R>>; N], (batch, cluster, slots)| {
-                slots.fill([R::default(); 4]);
-                let outside = kernel(batch, cluster, local(cluster, vectors, room), slots);
-                outside.map(|e| (cluster.elements[e], batch))
-            })
+            .map_init(
+                || (Room::<R, N>::new(), Room::<R, 1>::new()),
+                |(room, out), (batch, k, own, foreign)| {
+                    let (blocks, cluster) = (&batch.blocks, &batch.clusters[k]);
+                    let vectors = room.copies(blocks, cluster, vectors);
+                    let [out] = out.zeros(blocks, cluster);
+                    let outside = kernel(batch, blocks.part(k), vectors, out);
+                    cluster.leave(out, own, foreign);
+                    outside.map(|e| (cluster.elements[e], batch))
+                },
+            )
             .flatten()
             .min_by_key(|(element, _)| *element);
         outside.map_or(Ok(()), |(element, batch)| Err(batch.left(element)))
@@ -133,11 +196,11 @@ impl<R: Precision> CpuField<R> {
     /// Pass 1 of what reports no domain.
     fn everywhere<const N: usize>(
         &mut self,
-        vectors: [&Vec<[R; 3]>; N],
-        kernel: impl Fn(&dyn Compute<R>, &Blocks<R>, Vectors<R, N>, &mut [Node<R>]) + Sync,
+        vectors: [&CpuVector<R>; N],
+        kernel: impl Fn(&dyn Compute<R>, Part<R>, Vectors<R, N>, &mut [Node<R>]) + Sync,
     ) {
-        let done = self.elements(vectors, |compute, blocks, vectors, out| {
-            kernel(compute, blocks, vectors, out);
+        let done = self.elements(vectors, |compute, part, vectors, out| {
+            kernel(compute, part, vectors, out);
             None
         });
         debug_assert!(done.is_ok(), "differentials and damping report no domain");
@@ -146,53 +209,70 @@ impl<R: Precision> CpuField<R> {
     /// Stores what products with the tangent need of the state.
     fn linearize(&mut self) {
         let u = &self.state;
-        for batch in &mut self.batches {
-            let compute = &*batch.compute;
-            batch.clusters.par_iter_mut().for_each_init(
-                || [vec![]],
-                |room, cluster| {
-                    let mut states = cluster.states.take().unwrap_or_else(|| compute.states(&cluster.blocks));
-                    let [u] = local(cluster, [u], room);
-                    compute.linearize(&cluster.blocks, u, &mut states);
-                    cluster.states = Some(states);
-                },
-            );
+        for batch in self.batches.iter_mut().filter(|b| b.tangent == Tangent::Stored) {
+            let (compute, blocks, clusters) = (&*batch.compute, &batch.blocks, &batch.clusters);
+            let states = batch.states.get_or_insert_with(|| compute.states(blocks));
+            states.parts_mut(blocks).into_par_iter().enumerate().for_each_init(Room::new, |room, (k, states)| {
+                let [u] = room.copies(blocks, &clusters[k], [u]);
+                compute.linearize(blocks.part(k), u, states);
+            });
         }
         self.is_linearized = true;
     }
 
     /// Pass 1 of a product with the tangent at the prepared state: that of rest, if none was.
-    fn apply(&mut self, du: &Vec<[R; 3]>) {
+    fn apply(&mut self, du: &CpuVector<R>) {
         if !self.is_linearized {
             self.linearize();
         }
-        let done = self.pass([du], |batch, cluster, [du], out| {
-            let states = cluster.states.as_ref().expect("the tangent is linearized");
-            batch.compute.apply(&cluster.blocks, states, du, out);
-            None
-        });
+        fn stored<R: Precision>(batch: &CpuBatch<R>, part: Part<R>, du: &[Node<R>], out: &mut [Node<R>]) {
+            let states = batch.states.as_ref().expect("the tangent is linearized");
+            batch.compute.apply(part, states.of(part), du, out);
+        }
+        let done = if self.batches.iter().all(|b| b.tangent == Tangent::Stored) {
+            self.pass([du], |batch, part, [du], out| {
+                stored(batch, part, du, out);
+                None
+            })
+        } else {
+            self.at_state(|field, u| {
+                field.pass([u, du], |batch, part, [u, du], out| {
+                    match batch.tangent {
+                        Tangent::Stored => stored(batch, part, du, out),
+                        Tangent::Recomputed => batch.compute.dforce(part, [u, du], out),
+                    }
+                    None
+                })
+            })
+        };
         debug_assert!(done.is_ok(), "differentials report no domain");
+    }
+
+    /// What is computed at the displacement at which the tangent is taken.
+    fn at_state<T>(&mut self, compute: impl FnOnce(&mut Self, &CpuVector<R>) -> T) -> T {
+        let state = std::mem::replace(&mut self.state, CpuVector(vec![]));
+        let result = compute(self, &state);
+        self.state = state;
+        result
     }
 
     /// What a kernel gives each element, by the mesh's numbers.
     fn each<T: Copy + Send + Sync, U: Clone>(
         &self,
-        u: &Vec<[R; 3]>,
+        u: &CpuVector<R>,
         zero: T,
-        kernel: impl Fn(&dyn Compute<R>, &Blocks<R>, &[Node<R>], &mut [T]) -> Option<usize> + Sync,
+        kernel: impl Fn(&dyn Compute<R>, Part<R>, &[Node<R>], &mut [T]) -> Option<usize> + Sync,
         convert: impl Fn(T) -> U,
     ) -> Result<Vec<U>, LeftDomain> {
         let mut all = vec![convert(zero); self.elements];
         let mut outside: Option<(u32, &CpuBatch<R>)> = None;
         for batch in &self.batches {
-            let room = || [vec![]];
-            let of_clusters: Vec<(Vec<T>, Option<usize>)> = batch
-                .clusters
-                .par_iter()
-                .map_init(room, |room, cluster| {
+            let clusters = batch.clusters.par_iter().enumerate();
+            let of_clusters: Vec<(Vec<T>, Option<usize>)> = clusters
+                .map_init(Room::new, |room, (k, cluster)| {
                     let mut out = vec![zero; cluster.elements.len()];
-                    let [u] = local(cluster, [u], room);
-                    let outside = kernel(&*batch.compute, &cluster.blocks, u, &mut out);
+                    let [u] = room.copies(&batch.blocks, cluster, [u]);
+                    let outside = kernel(&*batch.compute, batch.blocks.part(k), u, &mut out);
                     (out, outside)
                 })
                 .collect();
@@ -205,53 +285,56 @@ impl<R: Precision> CpuField<R> {
         outside.map_or(Ok(all), |(element, batch)| Err(batch.left(element)))
     }
 
-    /// The sum of a node's slots.
-    fn sum_of_slots(&self, node: usize) -> [R; 3] {
-        let mut sum = [R::default(); 4];
-        for &slot in self.incidence.of(NodeId(node as u32)) {
-            let partial = self.slots[slot as usize];
-            for c in 0..4 {
-                sum[c] = sum[c] + partial[c];
+    /// Pass 2: of each block of nodes its number and the sums of their partial forces.
+    fn sums(&mut self) -> impl IndexedParallelIterator<Item = (usize, &[[R; 3]])> {
+        let Self { own, foreign, shared, slots, .. } = self;
+        let (foreign, shared, slots) = (&*foreign, &*shared, &*slots);
+        own.par_chunks_mut(BLOCK).enumerate().map(move |(block, sums)| {
+            let first = block * BLOCK;
+            let start = shared.partition_point(|(node, _)| (*node as usize) < first);
+            for (node, range) in shared[start..].iter().take_while(|(node, _)| (*node as usize) < first + BLOCK) {
+                let sum = &mut sums[*node as usize - first];
+                for slot in &slots[range.start as usize..range.end as usize] {
+                    let partial = foreign[*slot as usize];
+                    for c in 0..3 {
+                        sum[c] = sum[c] + partial[c];
+                    }
+                }
             }
-        }
-        let [x, y, z, _] = sum;
-        [x, y, z]
+            (block, &*sums)
+        })
     }
 
-    /// Pass 2: y += factor times the sum of each node's slots.
-    fn nodes(&self, factor: R, y: &mut [[R; 3]]) {
-        y.par_chunks_mut(BLOCK).enumerate().for_each(|(k, y)| {
-            for (i, y) in y.iter_mut().enumerate() {
-                let sum = self.sum_of_slots(k * BLOCK + i);
-                for c in 0..3 {
-                    y[c] = y[c] + factor * sum[c];
-                }
+    /// y += factor times the sum of each node's partial forces.
+    fn nodes(&mut self, factor: R, y: &mut CpuVector<R>) {
+        self.sums().zip(y.0.par_chunks_mut(BLOCK)).for_each(|((_, sums), y)| {
+            for (y, sum) in y.as_flattened_mut().iter_mut().zip(sums.as_flattened()) {
+                *y = *y + factor * *sum;
             }
         });
     }
 
-    /// Pass 2 of a product: y = factor times the sum of each node's slots + mass M x, imposed components 0; x . y. One pass
-    /// over the vectors, with the arithmetic of [`Operator::apply`] and [`Backend::dot`].
+    /// y = factor times the sum of each node's partial forces + mass M x, imposed components 0; x . y. One pass over the
+    /// vectors, with the arithmetic of [`Operator::apply`] and [`Backend::dot`].
     fn product_at_nodes(
-        &self,
+        &mut self,
         backend: &CpuBackend<R>,
         [factor, mass]: [R; 2],
-        masses: &[[R; 3]],
-        x: &[[R; 3]],
-        y: &mut [[R; 3]],
+        masses: &CpuVector<R>,
+        x: &CpuVector<R>,
+        y: &mut CpuVector<R>,
     ) -> f64 {
-        let blocks: Vec<f64> = y
-            .par_chunks_mut(BLOCK)
-            .enumerate()
-            .map(|(block, y)| {
-                let first = block * BLOCK;
-                let (x, masses) = (&x[first..][..y.len()], &masses[first..][..y.len()]);
-                for (i, y) in y.iter_mut().enumerate() {
-                    let sum = self.sum_of_slots(first + i);
-                    *y = std::array::from_fn(|c| factor * sum[c] + mass * (masses[i][c] * x[i][c]));
+        let given = x.0.par_chunks(BLOCK).zip(masses.0.par_chunks(BLOCK));
+        let blocks: Vec<f64> = self
+            .sums()
+            .zip(y.0.par_chunks_mut(BLOCK).zip(given))
+            .map(|((block, sums), (y, (x, masses)))| {
+                let numbers = sums.as_flattened().iter().zip(x.as_flattened()).zip(masses.as_flattened());
+                for (y, ((sum, x), m)) in y.as_flattened_mut().iter_mut().zip(numbers) {
+                    *y = factor * *sum + mass * (*m * *x);
                 }
                 backend.imposed(block).for_each(|(i, c)| y[i][c] = R::default());
-                x.iter().zip(y.iter()).map(|(x, y)| exact_dot(x, y)).sum::<f64>()
+                exact_dot(x, y)
             })
             .collect();
         blocks.iter().sum()
@@ -259,77 +342,81 @@ impl<R: Precision> CpuField<R> {
 }
 
 impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
-    fn element_energies(&mut self, _: &CpuBackend<R>, u: &Vec<[R; 3]>) -> Result<Vec<f64>, LeftDomain> {
-        self.each(u, R::default(), |compute, blocks, u, out| compute.energy(blocks, u, out), R::to_f64)
+    fn element_energies(&mut self, _: &CpuBackend<R>, u: &CpuVector<R>) -> Result<Vec<f64>, LeftDomain> {
+        self.each(u, R::default(), |compute, part, u, out| compute.energy(part, u, out), R::to_f64)
     }
 
-    fn cauchy(&mut self, _: &CpuBackend<R>, u: &Vec<[R; 3]>) -> Vec<[f64; 9]> {
-        let stress = |compute: &dyn Compute<R>, blocks: &Blocks<R>, u: &[Node<R>], out: &mut [[R; 9]]| {
-            compute.cauchy(blocks, u, out);
+    fn cauchy(&mut self, _: &CpuBackend<R>, u: &CpuVector<R>) -> Vec<[f64; 9]> {
+        let stress = |compute: &dyn Compute<R>, part: Part<R>, u: &[Node<R>], out: &mut [[R; 9]]| {
+            compute.cauchy(part, u, out);
             None
         };
         // The kernel cannot fail: outside the domain its values are not used.
         self.each(u, [R::default(); 9], stress, |s| s.map(R::to_f64)).unwrap_or_default()
     }
 
-    fn add_force(&mut self, _: &CpuBackend<R>, u: &Vec<[R; 3]>, f: &mut Vec<[R; 3]>) -> Result<(), LeftDomain> {
-        self.elements([u], |compute, blocks, [u], out| compute.force(blocks, u, out))?;
+    fn add_force(&mut self, _: &CpuBackend<R>, u: &CpuVector<R>, f: &mut CpuVector<R>) -> Result<(), LeftDomain> {
+        self.elements([u], |compute, part, [u], out| compute.force(part, u, out))?;
         self.nodes(R::from_f64(1.0), f);
         Ok(())
     }
 
-    fn prepare(&mut self, backend: &CpuBackend<R>, u: &Vec<[R; 3]>) {
+    fn prepare(&mut self, backend: &CpuBackend<R>, u: &CpuVector<R>) {
         backend.copy(u, &mut self.state);
         self.linearize();
     }
 
-    fn add_dforce(&mut self, _: &CpuBackend<R>, du: &Vec<[R; 3]>, factor: f64, df: &mut Vec<[R; 3]>) {
+    fn add_dforce(&mut self, _: &CpuBackend<R>, du: &CpuVector<R>, factor: f64, df: &mut CpuVector<R>) {
         self.apply(du);
         self.nodes(R::from_f64(factor), df);
     }
 
-    fn add_diagonal(&mut self, backend: &CpuBackend<R>, factor: f64, d: &mut Vec<[R; 3]>) {
-        let state = std::mem::take(&mut self.state);
-        self.add_diagonal_at(backend, &state, factor, d);
-        self.state = state;
+    fn add_diagonal(&mut self, backend: &CpuBackend<R>, factor: f64, d: &mut CpuVector<R>) {
+        self.at_state(|field, u| field.add_diagonal_at(backend, u, factor, d));
     }
 
     fn add_dforce_at(
         &mut self,
         _: &CpuBackend<R>,
-        u: &Vec<[R; 3]>,
-        du: &Vec<[R; 3]>,
+        u: &CpuVector<R>,
+        du: &CpuVector<R>,
         factor: f64,
-        df: &mut Vec<[R; 3]>,
+        df: &mut CpuVector<R>,
     ) {
-        self.everywhere([u, du], |compute, blocks, u_du, out| compute.dforce(blocks, u_du, out));
+        self.everywhere([u, du], |compute, part, u_du, out| compute.dforce(part, u_du, out));
         self.nodes(R::from_f64(factor), df);
     }
 
-    fn add_diagonal_at(&mut self, _: &CpuBackend<R>, u: &Vec<[R; 3]>, factor: f64, d: &mut Vec<[R; 3]>) {
-        self.everywhere([u], |compute, blocks, [u], out| compute.diagonal(blocks, u, out));
+    fn add_diagonal_at(&mut self, _: &CpuBackend<R>, u: &CpuVector<R>, factor: f64, d: &mut CpuVector<R>) {
+        self.everywhere([u], |compute, part, [u], out| compute.diagonal(part, u, out));
         self.nodes(R::from_f64(factor), d);
     }
 
-    fn add_damping(&mut self, _: &CpuBackend<R>, [u, v]: [&Vec<[R; 3]>; 2], factor: f64, f: &mut Vec<[R; 3]>) {
-        self.everywhere([u, v], |compute, blocks, u_v, out| compute.damping(blocks, u_v, out));
+    fn add_damping(&mut self, _: &CpuBackend<R>, [u, v]: [&CpuVector<R>; 2], factor: f64, f: &mut CpuVector<R>) {
+        self.everywhere([u, v], |compute, part, u_v, out| compute.damping(part, u_v, out));
         self.nodes(R::from_f64(factor), f);
     }
 
     fn add_ddamping(
         &mut self,
         _: &CpuBackend<R>,
-        [u, v]: [&Vec<[R; 3]>; 2],
-        dv: &Vec<[R; 3]>,
+        [u, v]: [&CpuVector<R>; 2],
+        dv: &CpuVector<R>,
         factor: f64,
-        df: &mut Vec<[R; 3]>,
+        df: &mut CpuVector<R>,
     ) {
-        self.everywhere([u, v, dv], |compute, blocks, u_v_dv, out| compute.ddamping(blocks, u_v_dv, out));
+        self.everywhere([u, v, dv], |compute, part, u_v_dv, out| compute.ddamping(part, u_v_dv, out));
         self.nodes(R::from_f64(factor), df);
     }
 
-    fn add_damping_diagonal(&mut self, _: &CpuBackend<R>, [u, v]: [&Vec<[R; 3]>; 2], factor: f64, d: &mut Vec<[R; 3]>) {
-        self.everywhere([u, v], |compute, blocks, u_v, out| compute.damping_diagonal(blocks, u_v, out));
+    fn add_damping_diagonal(
+        &mut self,
+        _: &CpuBackend<R>,
+        [u, v]: [&CpuVector<R>; 2],
+        factor: f64,
+        d: &mut CpuVector<R>,
+    ) {
+        self.everywhere([u, v], |compute, part, u_v, out| compute.damping_diagonal(part, u_v, out));
         self.nodes(R::from_f64(factor), d);
     }
 
@@ -337,8 +424,8 @@ impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
         &mut self,
         backend: &CpuBackend<R>,
         operator: &Operator<CpuBackend<R>>,
-        x: &Vec<[R; 3]>,
-        y: &mut Vec<[R; 3]>,
+        x: &CpuVector<R>,
+        y: &mut CpuVector<R>,
         registers: &mut [f64; REGISTERS],
     ) {
         if registers[RUNNING] == 0.0 {

@@ -3,12 +3,14 @@
 mod cluster;
 mod field;
 mod one;
+mod tune;
 mod vectors;
 
 pub use field::CpuField;
 pub use one::One;
 pub use tensormass_kernels::Engine;
-pub use vectors::CpuBackend;
+pub use tune::fastest;
+pub use vectors::{CpuBackend, CpuVector};
 
 /// A precision of the CPU backend.
 pub trait Precision: tensormass_kernels::Precision + std::iter::Sum {

@@ -21,8 +21,9 @@ impl One {
         let nodes: Vec<u32> = (0..element.info.nodes as u32).collect();
         let compute = compose::<f64>(Engine::SCALAR, element, law);
         let shape = [element.info.nodes, element.info.points.len(), law.info.constants.len()];
-        let cluster = Cluster { nodes: &nodes, rest, constants, per_element: false };
-        Self { blocks: Blocks::new(compute.lanes(), shape, &cluster), compute }
+        let mut blocks = Blocks::new(compute.lanes(), shape, false, &[1]);
+        blocks.fill(0, &Cluster { nodes: &nodes, rest, constants });
+        Self { blocks, compute }
     }
 
     /// What is added to zeros at the nodes.
@@ -36,27 +37,27 @@ impl One {
     /// The strain energy, where the element is inside the law's domain.
     pub fn energy(&self, u: &[[f64; 3]]) -> Option<f64> {
         let mut energy = [0.0];
-        let outside = self.compute.energy(&self.blocks, &padded(u), &mut energy);
+        let outside = self.compute.energy(self.blocks.part(0), &padded(u), &mut energy);
         outside.is_none().then_some(energy[0])
     }
 
     /// Nodal forces; whether the element is inside the law's domain.
     pub fn force(&self, u: &[[f64; 3]], out: &mut [[f64; 3]]) -> bool {
-        self.nodal(out, |f| self.compute.force(&self.blocks, &padded(u), f).is_none())
+        self.nodal(out, |f| self.compute.force(self.blocks.part(0), &padded(u), f).is_none())
     }
 
     /// Their differentials where u changes by du.
     pub fn dforce(&self, u: &[[f64; 3]], du: &[[f64; 3]], out: &mut [[f64; 3]]) {
-        self.nodal(out, |f| self.compute.dforce(&self.blocks, [&padded(u), &padded(du)], f));
+        self.nodal(out, |f| self.compute.dforce(self.blocks.part(0), [&padded(u), &padded(du)], f));
     }
 
     /// The diagonal of the tangent stiffness.
     pub fn diagonal(&self, u: &[[f64; 3]], out: &mut [[f64; 3]]) {
-        self.nodal(out, |f| self.compute.diagonal(&self.blocks, &padded(u), f));
+        self.nodal(out, |f| self.compute.diagonal(self.blocks.part(0), &padded(u), f));
     }
 
     /// The differentials of damping forces where v changes by dv.
     pub fn ddamping(&self, [u, v, dv]: [&[[f64; 3]]; 3], out: &mut [[f64; 3]]) {
-        self.nodal(out, |f| self.compute.ddamping(&self.blocks, [&padded(u), &padded(v), &padded(dv)], f));
+        self.nodal(out, |f| self.compute.ddamping(self.blocks.part(0), [&padded(u), &padded(v), &padded(dv)], f));
     }
 }

@@ -4,16 +4,27 @@ use rayon::prelude::*;
 
 use super::Precision;
 use crate::backend::{ALPHA, Advance, BETA, Backend, Counts, Descent, REGISTERS, RUNNING, SUM, Update};
-use crate::body::Constraint;
+use crate::body::{Body, Constraint};
 use crate::device::DeviceError;
 use crate::mass::MassMatrix;
+use crate::order::node_places;
 
 /// Nodes a block: a block's partial sum is formed by one thread, blocks are added in order.
 pub(super) const BLOCK: usize = 1024;
 
-/// x . y of one node. The products of two f32 are exact in f64: a dot product's rounding does not limit a solver in f32.
-pub(super) fn exact_dot<R: Precision>(x: &[R; 3], y: &[R; 3]) -> f64 {
-    (0..3).map(|c| x[c].to_f64() * y[c].to_f64()).sum()
+/// x . y of a block of nodes. The products of two f32 are exact in f64: a dot product's rounding does not limit a solver in
+/// f32.
+pub(super) fn exact_dot<R: Precision>(x: &[[R; 3]], y: &[[R; 3]]) -> f64 {
+    // Numbers that are eight apart are summed first: one addition need not wait for another.
+    const APART: usize = 8;
+    let (x, y) = (x.as_flattened().chunks(APART), y.as_flattened().chunks(APART));
+    let mut sums = [0.0; APART];
+    for (x, y) in x.zip(y) {
+        for ((sum, x), y) in sums.iter_mut().zip(x).zip(y) {
+            *sum += x.to_f64() * y.to_f64();
+        }
+    }
+    sums.iter().sum()
 }
 
 /// A mass matrix in memory, in compressed rows.
@@ -24,18 +35,33 @@ pub struct CpuMatrix<R> {
     values: Vec<R>,
 }
 
-/// Vectors in memory.
+/// A vector in memory, in the backend's order of nodes.
+#[derive(Debug, Clone)]
+pub struct CpuVector<R>(pub(super) Vec<[R; 3]>);
+
+/// Vectors in memory. Nodes are ordered as the clusters of the body meet them, so that those of a cluster are together.
 #[derive(Debug)]
 pub struct CpuBackend<R> {
-    nodes: usize,
+    /// Where each node of the body is.
+    places: Vec<u32>,
+    /// By places, ascending.
     constraints: Vec<Constraint>,
     precision: std::marker::PhantomData<R>,
 }
 
 impl<R: Precision> CpuBackend<R> {
-    /// A backend for a body of `nodes` nodes with imposed components.
-    pub fn new(nodes: usize, constraints: Vec<Constraint>) -> Self {
-        Self { nodes, constraints, precision: std::marker::PhantomData }
+    /// A backend for a body.
+    pub fn new(body: &Body) -> Self {
+        let places = node_places(body);
+        let place = |c: &Constraint| Constraint { node: places[c.node as usize], ..*c };
+        let mut constraints: Vec<Constraint> = body.constraints.iter().map(place).collect();
+        constraints.sort_unstable_by_key(|c| (c.node, c.component));
+        Self { places, constraints, precision: std::marker::PhantomData }
+    }
+
+    /// Where each node of the body is in a vector.
+    pub(super) fn places(&self) -> &[u32] {
+        &self.places
     }
 
     /// The imposed components of a block's nodes: the node's place in the block, and the component.
@@ -46,88 +72,90 @@ impl<R: Precision> CpuBackend<R> {
         here.map(move |c| (c.node as usize - first, c.component as usize))
     }
 
-    fn each(&self, x: &[[R; 3]], y: &mut [[R; 3]], f: impl Fn(&[R; 3], &mut [R; 3]) + Sync) {
-        y.par_chunks_mut(BLOCK).zip(x.par_chunks(BLOCK)).for_each(|(y, x)| {
-            for (y, x) in y.iter_mut().zip(x) {
-                f(x, y);
+    /// y = f(x, y), number by number.
+    fn each(&self, x: &CpuVector<R>, y: &mut CpuVector<R>, f: impl Fn(R, R) -> R + Sync) {
+        y.0.par_chunks_mut(BLOCK).zip(x.0.par_chunks(BLOCK)).for_each(|(y, x)| {
+            for (y, x) in y.as_flattened_mut().iter_mut().zip(x.as_flattened()) {
+                *y = f(*x, *y);
             }
         });
     }
 }
 
 impl<R: Precision> Backend for CpuBackend<R> {
-    type Vector = Vec<[R; 3]>;
+    type Vector = CpuVector<R>;
     type Registers = [f64; REGISTERS];
     type Matrix = CpuMatrix<R>;
 
     fn zeros(&self) -> Self::Vector {
-        vec![[R::default(); 3]; self.nodes]
+        CpuVector(vec![[R::default(); 3]; self.places.len()])
     }
 
     fn upload(&self, values: &[[f64; 3]]) -> Self::Vector {
-        values.iter().map(|v| v.map(R::from_f64)).collect()
+        let mut x = self.zeros();
+        self.places.iter().zip(values).for_each(|(place, value)| x.0[*place as usize] = value.map(R::from_f64));
+        x
     }
 
     fn download(&self, x: &Self::Vector) -> Vec<[f64; 3]> {
-        x.iter().map(|v| v.map(R::to_f64)).collect()
+        self.places.iter().map(|place| x.0[*place as usize].map(R::to_f64)).collect()
     }
 
     fn copy(&self, x: &Self::Vector, y: &mut Self::Vector) {
-        y.copy_from_slice(x);
+        self.each(x, y, |x, _| x);
     }
 
     fn clear(&self, x: &mut Self::Vector) {
-        x.fill([R::default(); 3]);
+        x.0.par_chunks_mut(BLOCK).for_each(|x| x.fill([R::default(); 3]));
     }
 
     fn axpy(&self, a: f64, x: &Self::Vector, y: &mut Self::Vector) {
         let a = R::from_f64(a);
-        self.each(x, y, |x, y| {
-            for c in 0..3 {
-                y[c] = y[c] + a * x[c];
-            }
-        });
+        self.each(x, y, |x, y| y + a * x);
     }
 
     fn xpby(&self, x: &Self::Vector, b: f64, y: &mut Self::Vector) {
         let b = R::from_f64(b);
-        self.each(x, y, |x, y| {
-            for c in 0..3 {
-                y[c] = x[c] + b * y[c];
-            }
-        });
+        self.each(x, y, |x, y| x + b * y);
     }
 
     fn scale(&self, b: f64, y: &mut Self::Vector) {
         let b = R::from_f64(b);
-        y.par_chunks_mut(BLOCK).for_each(|y| y.iter_mut().for_each(|y| *y = y.map(|y| b * y)));
+        y.0.par_chunks_mut(BLOCK).for_each(|y| y.iter_mut().for_each(|y| *y = y.map(|y| b * y)));
     }
 
     fn multiply_add(&self, a: f64, d: &Self::Vector, x: &Self::Vector, y: &mut Self::Vector) {
         let a = R::from_f64(a);
-        y.par_chunks_mut(BLOCK).zip(x.par_chunks(BLOCK)).zip(d.par_chunks(BLOCK)).for_each(|((y, x), d)| {
-            for ((y, x), d) in y.iter_mut().zip(x).zip(d) {
-                for c in 0..3 {
-                    y[c] = y[c] + a * (d[c] * x[c]);
-                }
+        y.0.par_chunks_mut(BLOCK).zip(x.0.par_chunks(BLOCK)).zip(d.0.par_chunks(BLOCK)).for_each(|((y, x), d)| {
+            for ((y, x), d) in y.as_flattened_mut().iter_mut().zip(x.as_flattened()).zip(d.as_flattened()) {
+                *y = *y + a * (*d * *x);
             }
         });
     }
 
     fn matrix(&self, matrix: &MassMatrix) -> CpuMatrix<R> {
-        let MassMatrix { offsets, columns, values } = matrix.clone();
-        CpuMatrix { offsets, columns, values: values.into_iter().map(R::from_f64).collect() }
+        let mut node_at = vec![0; self.places.len()];
+        self.places.iter().enumerate().for_each(|(node, place)| node_at[*place as usize] = node);
+        let mut rows = CpuMatrix { offsets: vec![0], columns: vec![], values: vec![] };
+        for node in node_at {
+            let row = matrix.row(node);
+            rows.columns.extend(matrix.columns[row.clone()].iter().map(|n| self.places[*n as usize]));
+            rows.values.extend(matrix.values[row].iter().map(|value| R::from_f64(*value)));
+            // `as u32` is exact: there are as many entries as in the matrix.
+            rows.offsets.push(rows.columns.len() as u32);
+        }
+        rows
     }
 
     fn add_product(&self, a: f64, matrix: &CpuMatrix<R>, x: &Self::Vector, y: &mut Self::Vector) {
         let a = R::from_f64(a);
-        y.par_chunks_mut(BLOCK).enumerate().for_each(|(block, y)| {
+        y.0.par_chunks_mut(BLOCK).enumerate().for_each(|(block, y)| {
             for (i, y) in y.iter_mut().enumerate() {
                 let node = block * BLOCK + i;
                 let row = matrix.offsets[node] as usize..matrix.offsets[node + 1] as usize;
                 let mut sum = [R::default(); 3];
                 for (column, value) in matrix.columns[row.clone()].iter().zip(&matrix.values[row]) {
-                    let x = &x[*column as usize];
+                    let x = &x.0[*column as usize];
                     for c in 0..3 {
                         sum[c] = sum[c] + *value * x[c];
                     }
@@ -140,19 +168,16 @@ impl<R: Precision> Backend for CpuBackend<R> {
     }
 
     fn divide(&self, x: &Self::Vector, d: &Self::Vector, y: &mut Self::Vector) {
-        y.par_chunks_mut(BLOCK).zip(x.par_chunks(BLOCK)).zip(d.par_chunks(BLOCK)).for_each(|((y, x), d)| {
-            for ((y, x), d) in y.iter_mut().zip(x).zip(d) {
-                for c in 0..3 {
-                    y[c] = x[c] / d[c];
-                }
+        y.0.par_chunks_mut(BLOCK).zip(x.0.par_chunks(BLOCK)).zip(d.0.par_chunks(BLOCK)).for_each(|((y, x), d)| {
+            for ((y, x), d) in y.as_flattened_mut().iter_mut().zip(x.as_flattened()).zip(d.as_flattened()) {
+                *y = *x / *d;
             }
         });
     }
 
     fn dot(&self, x: &Self::Vector, y: &Self::Vector) -> f64 {
-        let blocks = x.par_chunks(BLOCK).zip(y.par_chunks(BLOCK));
-        let block = |(x, y): (&[[R; 3]], &[[R; 3]])| x.iter().zip(y).map(|(x, y)| exact_dot(x, y)).sum::<f64>();
-        blocks.map(block).collect::<Vec<f64>>().iter().sum()
+        let blocks = x.0.par_chunks(BLOCK).zip(y.0.par_chunks(BLOCK));
+        blocks.map(|(x, y)| exact_dot(x, y)).collect::<Vec<f64>>().iter().sum()
     }
 
     fn max_abs(&self, x: &Self::Vector) -> f64 {
@@ -162,25 +187,25 @@ impl<R: Precision> Backend for CpuBackend<R> {
                 if v.is_finite() { m.max(v) } else { f64::INFINITY }
             })
         };
-        x.par_chunks(BLOCK).map(block).reduce(|| 0.0, f64::max)
+        x.0.par_chunks(BLOCK).map(block).reduce(|| 0.0, f64::max)
     }
 
     fn project(&self, x: &mut Self::Vector) {
         for c in &self.constraints {
-            x[c.node as usize][c.component as usize] = R::default();
+            x.0[c.node as usize][c.component as usize] = R::default();
         }
     }
 
     fn impose(&self, motions: &[f64], x: &mut Self::Vector) {
         for c in &self.constraints {
-            x[c.node as usize][c.component as usize] = R::from_f64(motions[c.motion]);
+            x.0[c.node as usize][c.component as usize] = R::from_f64(motions[c.motion]);
         }
     }
 
     fn impose_change(&self, motions: &[f64], x: &Self::Vector, y: &mut Self::Vector) {
         for c in &self.constraints {
             let (node, component) = (c.node as usize, c.component as usize);
-            y[node][component] = R::from_f64(motions[c.motion]) - x[node][component];
+            y.0[node][component] = R::from_f64(motions[c.motion]) - x.0[node][component];
         }
     }
 
@@ -189,7 +214,7 @@ impl<R: Precision> Backend for CpuBackend<R> {
             v if v == 0.0 || v.is_nan() => R::from_f64(1.0),
             v => R::from_f64(v.abs()),
         };
-        x.par_chunks_mut(BLOCK).for_each(|x| x.iter_mut().for_each(|x| *x = x.map(positive)));
+        x.0.par_chunks_mut(BLOCK).for_each(|x| x.iter_mut().for_each(|x| *x = x.map(positive)));
     }
 
     fn epsilon(&self) -> f64 {
@@ -225,22 +250,21 @@ impl<R: Precision> Backend for CpuBackend<R> {
             let Descent { d, q, preconditioner, x, r, z } = descent;
             let alpha = R::from_f64(registers[ALPHA]);
             let minus = R::from_f64(-registers[ALPHA]);
-            let given = d.par_chunks(BLOCK).zip(q.par_chunks(BLOCK)).zip(preconditioner.par_chunks(BLOCK));
-            let changed = x.par_chunks_mut(BLOCK).zip(r.par_chunks_mut(BLOCK)).zip(z.par_chunks_mut(BLOCK));
+            let given = d.0.par_chunks(BLOCK).zip(q.0.par_chunks(BLOCK)).zip(preconditioner.0.par_chunks(BLOCK));
+            let changed = x.0.par_chunks_mut(BLOCK).zip(r.0.par_chunks_mut(BLOCK)).zip(z.0.par_chunks_mut(BLOCK));
             // One pass over the vectors: each is read and written once.
             let blocks: Vec<f64> = given
                 .zip(changed)
                 .map(|(((d, q), preconditioner), ((x, r), z))| {
-                    let mut sum = 0.0;
-                    for i in 0..x.len() {
-                        for c in 0..3 {
-                            x[i][c] = x[i][c] + alpha * d[i][c];
-                            r[i][c] = r[i][c] + minus * q[i][c];
-                            z[i][c] = r[i][c] / preconditioner[i][c];
-                        }
-                        sum += exact_dot(&r[i], &z[i]);
+                    let given = d.as_flattened().iter().zip(q.as_flattened()).zip(preconditioner.as_flattened());
+                    let [x, residual, scaled] = [x, &mut *r, &mut *z].map(|x| x.as_flattened_mut());
+                    let changed = x.iter_mut().zip(residual).zip(scaled);
+                    for (((x, r), z), ((d, q), preconditioner)) in changed.zip(given) {
+                        *x = *x + alpha * *d;
+                        *r = *r + minus * *q;
+                        *z = *r / *preconditioner;
                     }
-                    sum
+                    exact_dot(r, z)
                 })
                 .collect();
             registers[SUM] = blocks.iter().sum();
@@ -250,14 +274,14 @@ impl<R: Precision> Backend for CpuBackend<R> {
     fn advance(&self, advance: Advance<Self>) {
         let Advance { force, masses, keep, kick, drift, v, u, .. } = advance;
         let [keep, kick, drift] = [keep, kick, drift].map(R::from_f64);
-        let given = force.par_chunks(BLOCK).zip(masses.par_chunks(BLOCK));
+        let given = force.0.par_chunks(BLOCK).zip(masses.0.par_chunks(BLOCK));
         // One pass over the vectors, with the arithmetic of the four operations.
-        v.par_chunks_mut(BLOCK).zip(u.par_chunks_mut(BLOCK)).zip(given).for_each(|((v, u), (force, masses))| {
-            for i in 0..v.len() {
-                for c in 0..3 {
-                    v[i][c] = keep * v[i][c] + kick * (force[i][c] / masses[i][c]);
-                    u[i][c] = u[i][c] + drift * v[i][c];
-                }
+        v.0.par_chunks_mut(BLOCK).zip(u.0.par_chunks_mut(BLOCK)).zip(given).for_each(|((v, u), (force, masses))| {
+            let given = force.as_flattened().iter().zip(masses.as_flattened());
+            let changed = v.as_flattened_mut().iter_mut().zip(u.as_flattened_mut());
+            for ((v, u), (force, masses)) in changed.zip(given) {
+                *v = keep * *v + kick * (*force / *masses);
+                *u = *u + drift * *v;
             }
         });
     }

@@ -25,7 +25,7 @@ mod suggest;
 pub use error::{Fault, Location, SceneError};
 pub use model::{
     About, Axis, Beam, Boundary, ConjugateGradient, History, Initial, Integrator, Load, Mass, Material, Mesh, Motion,
-    Newton, Parameter, ParameterValue, PerElement, Precision, Preconditioner, Ramp, SceneData, Solver,
+    Newton, Parameter, ParameterValue, PerElement, Precision, Preconditioner, Ramp, SceneData, Solver, TangentChoice,
 };
 pub use output::{Component, EnergyPart, Field, Output, Probe, Statistic, StressComponent};
 pub use overrides::Override;

@@ -484,11 +484,18 @@ pub struct ConjugateGradient {
     pub max_iterations: u32,
     /// What the residual is multiplied by before each search direction.
     pub preconditioner: Preconditioner,
+    /// How products with the tangent are computed on a CPU; results do not depend on it.
+    pub tangent: TangentChoice,
 }
 
 impl Default for ConjugateGradient {
     fn default() -> Self {
-        Self { tolerance: 1e-6, max_iterations: 2000, preconditioner: Preconditioner::Jacobi }
+        Self {
+            tolerance: 1e-6,
+            max_iterations: 2000,
+            preconditioner: Preconditioner::Jacobi,
+            tangent: TangentChoice::Auto,
+        }
     }
 }
 
@@ -500,6 +507,20 @@ pub enum Preconditioner {
     Jacobi,
     /// None.
     None,
+}
+
+/// How products with the tangent are computed on a CPU.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TangentChoice {
+    /// As a fixed rule has it, for each law by its operations and the size of the body.
+    Auto,
+    /// What does not depend on the increment is stored once an iteration of Newton's method.
+    Stored,
+    /// Everything is computed in each product.
+    Recomputed,
+    /// As is faster: measured before the first step.
+    Measured,
 }
 
 /// The nonlinear solver: Newton's method.

@@ -129,6 +129,9 @@ pub fn run_on(
             let field = GpuField::new(&backend, &model.body)?;
             let mut run = Run::new(scene, model, backend, field, Layout::Gpu);
             run.warnings.extend(target.warning());
+            if scene.solver.cg.tangent != scene::TangentChoice::Auto {
+                run.warnings.push("solver.cg.tangent has no effect on a GPU: there products store nothing".to_owned());
+            }
             run.all(out, observer)
         }
         #[cfg(feature = "gpu")]
@@ -144,7 +147,10 @@ fn on_cpu<R: Precision>(
     observer: &mut (dyn Observer + Send),
 ) -> Result<Outcome, RunError> {
     let body = &model.body;
-    let backend = CpuBackend::<R>::new(body.masses.len(), body.constraints.clone());
-    let field = CpuField::<R>::new(body);
-    Run::new(scene, model, backend, field, Layout::Cpu).all(out, observer)
+    let backend = CpuBackend::<R>::new(body);
+    let field = CpuField::<R>::new(&backend, body);
+    let (field, tangents, by) = setup::with_tangents(scene, body, &backend, field);
+    let mut run = Run::new(scene, model, backend, field, Layout::Cpu);
+    run.tangents = Some((tangents, by));
+    run.all(out, observer)
 }

@@ -14,6 +14,7 @@ use crate::probe::{Energies, Needs, Snapshot};
 use crate::scene::{self, Scene};
 use crate::step_limit::{StepLimits, element_limit, power_limit};
 use crate::system::{SolveError, State, StepReport, System};
+use crate::tangent::{ChosenBy, Tangent};
 
 use super::setup::{Stepper, integrator, stepping};
 use super::{Ending, Observer, Outcome, RunError};
@@ -32,6 +33,8 @@ pub(super) struct Run<'a, B: Backend, F: ForceField<B>> {
     pub(super) warnings: Vec<String>,
     limits: Option<StepLimits>,
     layout: Layout,
+    /// How products with the tangent are computed on a CPU, and who chose that.
+    pub(super) tangents: Option<(Vec<Tangent>, ChosenBy)>,
 }
 
 impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
@@ -55,6 +58,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
             warnings,
             limits: None,
             layout,
+            tangents: None,
         }
     }
 
@@ -253,7 +257,12 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         let scale = self.model.scale;
         let probes: serde_json::Map<String, Value> =
             self.model.recorder.names().iter().zip(&results.last).map(|((n, _), v)| (n.clone(), json!(v))).collect();
-        let plan = Plan::new(self.scene, &self.model, self.layout);
+        let plan = match &self.tangents {
+            Some((tangents, _)) => Plan::with_tangents(self.scene, &self.model, self.layout, tangents),
+            None => Plan::new(self.scene, &self.model, self.layout),
+        };
+        let implicit = !self.scene.solver.integrator.is_explicit();
+        let tangents_by = self.tangents.as_ref().filter(|_| implicit).map(|(_, by)| *by);
         let status = match ending {
             Ending::Done => "done",
             Ending::Failed(_) => "failed",
@@ -288,6 +297,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
                 "newton_iterations": self.cost.newton,
                 "stagnated_solutions": self.cost.stagnated,
                 "negative_curvatures": self.cost.negative_curvature,
+                "tangents_chosen_by": tangents_by,
             },
             "device_counts": self.device_counts(),
             "units": { "length_m": scale.length, "stress_Pa": scale.stress, "time_s": scale.time },

@@ -1,10 +1,13 @@
-//! From a scene to its steps and its integrator.
+//! From a scene to its steps, its integrator, and how its linear solver computes products.
 
 use crate::backend::{Backend, ForceField};
+use crate::body::Body;
 use crate::cg::CgLimits;
+use crate::cpu::{CpuBackend, CpuField, Precision, fastest};
 use crate::integrate::{CentralDifference, ImplicitEuler, NewtonLimits, SemiImplicitEuler, SolverSettings, Statics};
 use crate::scene::{self, Scene};
 use crate::system::Integrator;
+use crate::tangent::{self, ChosenBy, Tangent};
 
 /// An integrator on a backend.
 pub(super) type Stepper<B, F> = Box<dyn Integrator<B, F>>;
@@ -58,4 +61,22 @@ pub(super) fn integrator<B: Backend + 'static, F: ForceField<B> + 'static>(
         scene::Integrator::CentralDifference => Box::new(CentralDifference::new(backend)),
         scene::Integrator::Static => Box::new(Statics::new(backend, nodes, settings)),
     }
+}
+
+/// A field that computes products as a scene asks for, for each law of the body, and who chose that.
+pub(super) fn with_tangents<R: Precision>(
+    scene: &Scene,
+    body: &Body,
+    backend: &CpuBackend<R>,
+    field: CpuField<R>,
+) -> (CpuField<R>, Vec<Tangent>, ChosenBy) {
+    let (tangents, by) = tangent::asked_for(scene, body);
+    if scene.solver.integrator.is_explicit() || scene.solver.cg.tangent != scene::TangentChoice::Measured {
+        return (field.with_tangents(&tangents), tangents, by);
+    }
+    let all = |tangent| vec![tangent; body.batches.len()];
+    let mut candidates = vec![tangents, all(Tangent::Stored), all(Tangent::Recomputed)];
+    candidates.dedup();
+    let (field, fastest) = fastest(backend, field, &candidates);
+    (field, candidates.swap_remove(fastest), ChosenBy::Measurement)
 }

@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use tensormass_runtime::LawEntry;
+use tensormass_runtime::backend::Backend;
 use tensormass_runtime::body::{Body, Constraint, LawBatch, Rows};
-use tensormass_runtime::cpu::{CpuBackend, CpuField, Precision};
+use tensormass_runtime::cpu::{CpuBackend, CpuField, CpuVector, Precision};
 use tensormass_runtime::history::History;
 use tensormass_runtime::mass::lump;
 use tensormass_runtime::mesh::{ElementId, Mesh};
@@ -256,5 +257,14 @@ pub fn body(mesh: &Mesh, law: &'static LawEntry, parameters: &[f64], imposed: &[
 
 /// A body on the CPU.
 pub fn system<R: Precision>(body: Body) -> Cpu<R> {
-    System::new(CpuBackend::new(body.masses.len(), body.constraints.clone()), CpuField::new(&body), body)
+    let backend = CpuBackend::new(&body);
+    let field = CpuField::new(&backend, &body);
+    System::new(backend, field, body)
+}
+
+/// A vector that is 0 but at one node.
+pub fn at_node<R: Precision>(backend: &CpuBackend<R>, node: usize, value: [f64; 3]) -> CpuVector<R> {
+    let mut values = backend.download(&backend.zeros());
+    values[node] = value;
+    backend.upload(&values)
 }

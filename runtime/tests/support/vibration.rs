@@ -47,7 +47,8 @@ pub fn frequency(element: &'static ElementEntry, cells: usize) -> Frequency {
         u[n][0] = 1.0;
         let mut f = system.backend.zeros();
         system.field.prepare(&system.backend, &system.backend.zeros());
-        system.field.add_dforce(&system.backend, &u, -1.0, &mut f);
+        system.field.add_dforce(&system.backend, &system.backend.upload(&u), -1.0, &mut f);
+        let f = system.backend.download(&f);
         DVector::from_iterator(free.len(), free.iter().map(|n| f[*n][0]))
     };
     let stiffness = DMatrix::from_columns(&free.iter().map(|n| column(*n)).collect::<Vec<_>>());

@@ -1,0 +1,89 @@
+//! How products with the tangent are computed: what the rule takes, what plans and summaries say of it. That results do not
+//! depend on it is a test of `batches.rs`.
+
+mod support;
+
+use serde_json::Value;
+use support::{body, done, parameters, repository, scene};
+use tensormass_runtime::mesh::beam_of;
+use tensormass_runtime::model::build;
+use tensormass_runtime::plan::{Layout, Plan};
+use tensormass_runtime::tangent::{Tangent, by_rule};
+use tensormass_runtime::{ElementEntry, LawEntry, elements, laws};
+
+fn tetrahedron() -> &'static ElementEntry {
+    elements().iter().find(|e| e.info.name == "tetrahedron_p1").expect("an element of every build")
+}
+
+/// The rule's choice for so many linear tetrahedra of a law, in numbers of so many bytes.
+fn rule(law: &'static LawEntry, count: usize, real: usize) -> Tangent {
+    let mesh = beam_of(tetrahedron(), [1.0; 3], [1; 3], [0.0; 3]).expect("a cube");
+    let mut body = body(&mesh, law, &parameters(law), &[]);
+    // The rule counts elements, and looks at none.
+    body.batches[0].elements = vec![0; count];
+    by_rule(&body, real)[0]
+}
+
+#[test]
+fn laws_store_in_caches_and_where_it_saves_more_than_reading_costs() {
+    for law in laws() {
+        assert_eq!(rule(law, 60_000, 4), Tangent::Stored, "{}: all is in a cache", law.info.name);
+        let operations = |kernel: &str| {
+            let all = &law.info.operations;
+            all.iter().find(|o| o.kernel == kernel).map(|o| o.arithmetic())
+        };
+        let dforce = operations("dforce").expect("every law has a tangent");
+        let saved = tetrahedron().info.gradient_operations + dforce - operations("apply").unwrap_or(dforce);
+        let wanted = if saved >= 9 * law.info.stored as u32 { Tangent::Stored } else { Tangent::Recomputed };
+        for real in [4, 8] {
+            assert_eq!(rule(law, 1_000_000, real), wanted, "{}: {saved} saved by {}", law.info.name, law.info.stored);
+        }
+        assert!(!law.info.structure.linear || wanted == Tangent::Stored, "{}: linear laws read nothing", law.info.name);
+    }
+    let chosen: Vec<Tangent> = laws().iter().map(|law| rule(law, 1_000_000, 8)).collect();
+    assert!(chosen.contains(&Tangent::Stored) && chosen.contains(&Tangent::Recomputed), "{chosen:?}");
+}
+
+/// A law's tangent, its kernels and who chose it, as a run's summary has them.
+fn summary(tangent: &str) -> (Value, Vec<String>, Value) {
+    let text = std::fs::read_to_string(repository("scenes/gravity-svk.toml")).expect("a scene of the repository");
+    let set = [
+        "mesh.beam.cells=[4, 1, 1]",
+        "solver.integrator=\"implicit-euler\"",
+        "solver.step=0.01",
+        "solver.duration=0.02",
+        &format!("solver.cg.tangent={tangent}"),
+    ];
+    let scene = scene(&text, &set);
+    let model = build(&scene).expect("the scene can be built");
+    let plan = Plan::new(&scene, &model, Layout::Cpu);
+    let stores = plan.buffers.iter().any(|(name, _)| *name == "stored tangent");
+    let summary = done(&scene).summary;
+    let law = &summary["model"]["laws"][0];
+    let kernels = law["operations_per_element"].as_object().expect("kernels").keys().cloned().collect();
+    if tangent != "measured" {
+        assert_eq!(stores, law["tangent"] == "stored", "{tangent}: {:?}", plan.buffers);
+    }
+    (law["tangent"].clone(), kernels, summary["solver"]["tangents_chosen_by"].clone())
+}
+
+#[test]
+fn plans_and_summaries_say_what_is_chosen() {
+    let stored = ["apply", "diagonal", "force", "linearize"];
+    let recomputed = ["dforce", "diagonal", "force"];
+    for (asked, wanted, kernels, by) in [
+        ("auto", "stored", stored.as_slice(), "rule"),
+        ("stored", "stored", &stored, "scene"),
+        ("recomputed", "recomputed", &recomputed, "scene"),
+    ] {
+        let mut kernels: Vec<&str> = kernels.to_vec();
+        kernels.sort_unstable();
+        let (tangent, mut found, chosen_by) = summary(asked);
+        found.sort_unstable();
+        assert_eq!((tangent, chosen_by), (wanted.into(), by.into()), "{asked}");
+        assert_eq!(found, kernels, "{asked}");
+    }
+    let (tangent, _, chosen_by) = summary("measured");
+    assert!(tangent == "stored" || tangent == "recomputed", "{tangent}");
+    assert_eq!(chosen_by, "measurement");
+}
