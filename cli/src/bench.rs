@@ -11,7 +11,7 @@ use serde_json::json;
 use tensormass_runtime::device::DeviceChoice;
 #[cfg(feature = "gpu")]
 use tensormass_runtime::gpu::GpuOptions;
-use tensormass_runtime::measure::{self, Bench, MeasureError, Subject};
+use tensormass_runtime::measure::{self, Bench, Body, MeasureError, Subject};
 use tensormass_runtime::plan::precision_name;
 use tensormass_runtime::scene::Precision;
 use tensormass_runtime::target::Target;
@@ -35,6 +35,9 @@ pub struct Arguments {
     /// Cells of the beam along x, y and z instead, 20x10x10 say.
     #[arg(long, value_name = "XxYxZ", value_parser = cells, conflicts_with = "elements")]
     cells: Vec<[usize; 3]>,
+    /// A Gmsh file in metres instead, of elements of one kind; others if given again.
+    #[arg(long, value_name = "FILE.msh", conflicts_with_all = ["elements", "cells"])]
+    mesh: Vec<std::path::PathBuf>,
     /// Numbers of state and kernels; the other if given again.
     #[arg(long, value_name = "f32|f64", default_values = ["f32"], value_parser = precision)]
     precision: Vec<Precision>,
@@ -103,27 +106,34 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
         let find = |name: &String| law(name).ok_or_else(|| unknown("law", name, laws().iter().map(|l| l.info.name)));
         arguments.laws.iter().map(find).collect::<Result<_, _>>()?
     };
-    let bodies = || elements().iter().filter(|e| e.info.dimension > 1);
+    let solids = || elements().iter().filter(|e| e.info.dimension > 1);
     let element = match &arguments.element {
         None => linear_tetrahedron(),
-        Some(name) => bodies()
+        Some(name) => solids()
             .find(|e| e.info.name == *name)
-            .ok_or_else(|| unknown("element", name, bodies().map(|e| e.info.name)))?,
+            .ok_or_else(|| unknown("element", name, solids().map(|e| e.info.name)))?,
     };
     let bench = Bench::new(arguments.threads as usize).map_err(failed)?;
-    let beams: Vec<[usize; 3]> = match arguments.cells.as_slice() {
-        [] => arguments.elements.iter().map(|&count| measure::cells(element, count as usize)).collect(),
-        given => given.to_vec(),
-    };
+    let mut bodies: Vec<Body> = arguments.cells.iter().map(|&cells| Body::Beam(cells)).collect();
+    for file in &arguments.mesh {
+        // A scene takes files as relative to its own place.
+        let whole = std::path::absolute(file);
+        bodies.push(Body::File(whole.map_err(|e| Failure::bad_input(format!("--mesh {}: {e}", file.display())))?));
+    }
+    if bodies.is_empty() {
+        let cells = arguments.elements.iter().map(|&count| measure::cells(element, count as usize));
+        bodies.extend(cells.map(Body::Beam));
+    }
     let mut subjects = vec![];
     for &precision in &arguments.precision {
         let target = Target::open(&arguments.device, precision)
             .map_err(|e| Failure::bad_input(format!("--device {}: {e}", arguments.device)))?;
         for target in tuned(&target, arguments)? {
-            for &cells in &beams {
+            for body in &bodies {
                 for &law in &chosen {
                     let (repeats, stiffness_ratio) = (arguments.repeats as usize, arguments.stiffness_ratio);
-                    let subject = Subject { law, element, cells, precision, repeats, stiffness_ratio };
+                    let body = body.clone();
+                    let subject = Subject { law, element, body, precision, repeats, stiffness_ratio };
                     subjects.push((target.clone(), subject));
                 }
             }
@@ -232,7 +242,7 @@ fn unknown<'a>(what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> 
 
 fn failed(error: MeasureError) -> Failure {
     match error {
-        MeasureError::Build(_) | MeasureError::Device(_) | MeasureError::Threads { .. } => {
+        MeasureError::Build(_) | MeasureError::Device(_) | MeasureError::Kind { .. } | MeasureError::Threads { .. } => {
             Failure::bad_input(error.to_string())
         }
         MeasureError::LeftDomain(_) | MeasureError::Step(_) => Failure::Simulation(error.to_string()),

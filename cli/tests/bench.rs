@@ -110,6 +110,21 @@ fn what_cannot_be_measured_is_bad_input() {
     }
 }
 
+/// A mesh file: its elements are counted, and have to be of the kind that is measured.
+#[test]
+fn mesh_files_are_measured() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/tests/data/ball_2.msh");
+    let element = |name: &'static str| {
+        call(&["--repeats", "1", "--device", "cpu", "--law", "hooke", "--mesh", file, "--element", name])
+    };
+    let (status, text, err) = element("tetrahedron_p2");
+    assert_eq!((status, err.as_str()), (Some(0), ""));
+    assert!(text.contains("hooke, 50 tetrahedron_p2, "), "{text}");
+    let (status, _, err) = element("hexahedron_q1");
+    assert_eq!(status, Some(2));
+    assert!(err.contains("the mesh has elements of kind tetrahedron_p2, and hexahedron_q1 is measured"), "{err}");
+}
+
 /// An implicit step: which preconditioners, what they reach, and what a step consists of.
 #[test]
 fn an_implicit_step_is_solved_to_a_true_residual() {

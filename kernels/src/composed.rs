@@ -10,8 +10,9 @@ use crate::law::LawEntry;
 use crate::point::{DampingPointKernels, Material, Outside, PointKernels};
 use crate::table::{Precision, Tabled};
 
-/// Numbers of a tensor at some points, at most, unless one block has more: what of G, dG and P stays in a cache.
-const NUMBERS: usize = 64 * 9;
+/// Bytes of a tensor at the points that are computed at once, unless one block has more: what of G, dG and P stays in a
+/// cache, and as much of the elements as is asked for in advance.
+const BYTES: usize = 4 * 9 * 64;
 
 /// A law on an element, in one precision: what it computes of the elements of a cluster, from and to vectors at its
 /// nodes.
@@ -87,7 +88,7 @@ impl<V: Tabled> Composed<V> {
 
     /// Blocks that are computed at once.
     fn group(&self) -> usize {
-        (NUMBERS / (9 * V::COUNT * self.info.points.len())).max(1)
+        (BYTES / (9 * V::COUNT * size_of::<V::Scalar>() * self.info.points.len())).max(1)
     }
 
     /// Room for a tensor at each point of a group, and so many more.

@@ -149,6 +149,10 @@ pub trait Backend {
     fn turn(&self, z: &Self::Vector, d: &mut Self::Vector, registers: &Self::Registers);
     /// How many iterations a solver does well to take between two readings of its registers.
     fn iterations_between_readings(&self) -> u32;
+    /// How many explicit steps a run does well to take between two looks at the state.
+    fn steps_between_checks(&self) -> u64 {
+        1
+    }
 
     /// What the backend runs on.
     fn name(&self) -> String;
@@ -294,6 +298,16 @@ pub trait ForceField<B: Backend> {
     fn element_energies(&mut self, backend: &B, u: &B::Vector) -> Result<Vec<f64>, LeftDomain>;
     /// The Cauchy stress of each element at displacement u, in the mesh's numbering, 9 components row by row.
     fn cauchy(&mut self, backend: &B, u: &B::Vector) -> Vec<[f64; 9]>;
+    /// Whether [`ForceField::add_force`] may leave it to [`ForceField::check_domains`] to say that an element is outside: for
+    /// fields that wait for a device to know it. Others say it at once.
+    fn defer_domains(&mut self, _defer: bool) {}
+    /// Whether all elements were inside their laws' domains in all forces since domains are deferred.
+    ///
+    /// # Errors
+    /// An element was outside its law's domain.
+    fn check_domains(&mut self, _backend: &B) -> Result<(), LeftDomain> {
+        Ok(())
+    }
     /// f += the forces at displacement u.
     ///
     /// # Errors

@@ -223,20 +223,58 @@ fn the_solver_reads_once_a_submission() {
     }
 }
 
-/// An explicit step of a law without a domain reads one number: whether the state is still bounded.
+/// Explicit steps between which nothing is recorded read what says whether all went well: once for many of them, and
+/// besides, of a law with a domain, whether elements were inside.
 #[test]
-fn an_explicit_step_reads_once() {
+fn explicit_steps_read_once_a_stretch() {
     let Some(gpu) = test_device().map(Arc::new) else { return };
     let solver = "integrator = \"semi-implicit-euler\"\nstep = 5e-4\nduration = ";
-    for law in laws().iter().filter(|l| l.info.domain.is_none()) {
-        let readbacks = |duration: &str| {
+    for law in laws() {
+        let reads_and_submits = |duration: &str| {
             let text = bent(law, &format!("{solver}{duration}"));
             let without_probes = text.split("[[probe]]").next().expect("the scene before its probes");
-            on_gpu(&gpu, &scene::<&str>(without_probes, &[])).summary["device_counts"]["readbacks"].as_u64()
+            let summary = on_gpu(&gpu, &scene::<&str>(without_probes, &[])).summary;
+            ["readbacks", "submissions"].map(|count| summary["device_counts"][count].as_u64().expect("counted"))
         };
-        let (short, long) = (readbacks("0.01").expect("counted"), readbacks("0.02").expect("counted"));
-        assert_eq!(long - short, 20, "{}", law.info.name);
+        // After the first step 32, or 64.
+        let ([few, _], [more, _]) = (reads_and_submits("0.0165"), reads_and_submits("0.0325"));
+        let each = if law.info.domain.is_some() { 2 } else { 1 };
+        assert_eq!(more - few, each, "{}", law.info.name);
     }
+}
+
+/// A run that looks at the device's state after so many explicit steps.
+fn looking(gpu: &Arc<Gpu>, scene: &Scene, steps_between_checks: u32) -> Outcome {
+    let target = Target::Gpu(Arc::clone(gpu), GpuOptions { steps_between_checks, ..GpuOptions::default() });
+    run_on(&target, scene, None, &mut Silent).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// A run ends as it does where every state is looked at: with the same numbers, or with the same error at the same step.
+#[test]
+fn steps_that_nobody_looks_at_are_the_same() {
+    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let mut failed = 0;
+    for law in laws() {
+        for integrator in ["semi-implicit-euler", "central-difference"] {
+            // The second blows up.
+            for step in ["5e-4", "2e-2"] {
+                let solver = format!("integrator = \"{integrator}\"\nstep = {step}\nduration = {step}");
+                let text = bent(law, &solver) + "[output]\nprobe_every = 17\n";
+                let duration = format!("solver.duration={}", 60.0 * step.parse::<f64>().expect("a number"));
+                let scene = scene(&text, &[duration]);
+                let (one, many) = (looking(&gpu, &scene, 1), looking(&gpu, &scene, 32));
+                let name = format!("{}, {integrator}, {step} s", law.info.name);
+                assert_eq!(one.ending, many.ending, "{name}");
+                for key in ["steps", "simulated_time_s", "probes", "solver", "error"] {
+                    assert_eq!(one.summary[key], many.summary[key], "{name}: {key}");
+                }
+                failed += usize::from(one.ending != Ending::Done);
+                let submissions = |outcome: &Outcome| outcome.summary["device_counts"]["submissions"].as_u64();
+                assert!(one.ending != Ending::Done || submissions(&many) < submissions(&one), "{name}");
+            }
+        }
+    }
+    assert!(failed >= laws().len(), "{failed} runs failed");
 }
 
 /// Closes the device after a step.
@@ -295,8 +333,14 @@ fn options_are_made_valid() {
     let scene = scene::<&str>(&bent(&laws()[0], "integrator = \"implicit-euler\"\nstep = 0.01\nduration = 0.02"), &[]);
     let probes = |work_group_size, least| {
         let (elements_per_invocation, iterations_per_submission) = (least, least);
-        let options =
-            GpuOptions { work_group_size, elements_per_invocation, iterations_per_submission, binding_bytes: None };
+        let steps_between_checks = least;
+        let options = GpuOptions {
+            work_group_size,
+            elements_per_invocation,
+            iterations_per_submission,
+            steps_between_checks,
+            binding_bytes: None,
+        };
         let target = Target::Gpu(Arc::clone(&gpu), options);
         run_on(&target, &scene, None, &mut Silent).unwrap_or_else(|e| panic!("{e}")).probes
     };

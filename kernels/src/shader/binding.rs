@@ -6,7 +6,8 @@
 /// 1, 2, 4 for x, y, z), which no pass changes. With E elements in a pass, P quadrature points and n nodes an element:
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Binding {
-    /// `uniform`, 16 bytes: elements of the pass (`u32`), the rest unused.
+    /// `uniform`, 16 bytes: elements of the pass (`u32`), whether it keeps margins while elements are inside (`u32`), the
+    /// rest unused.
     ElementPass,
     /// `uniform`, 16 bytes: nodes (`u32`), whether the pass is the first to write its product (`u32`), the factor of the
     /// sum of slots (`f32`), the factor of the masses (`f32`).
@@ -94,9 +95,10 @@ const ELEMENT_PASS: &str = "\
 struct ElementPass {
     // Elements of the pass.
     elements: u32,
+    // 1 where margins that an earlier pass wrote stay while an element is inside.
+    keeps_margins: u32,
     unused_0: u32,
     unused_1: u32,
-    unused_2: u32,
 }
 
 ";

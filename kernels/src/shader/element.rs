@@ -378,7 +378,10 @@ impl Composed<'_> {
             }
         }
         if self.margin() {
+            // Of several passes the margin of the first that is outside stays.
+            out.open("if element_pass.keeps_margins == 0u || !(margin > 0.0f) {");
             out.line("margins[e] = margin;");
+            out.close();
         }
     }
 }

@@ -31,13 +31,21 @@ pub struct GpuOptions {
     pub elements_per_invocation: u32,
     /// Iterations of a linear solver in one submission.
     pub iterations_per_submission: u32,
+    /// Explicit steps between two looks at the state.
+    pub steps_between_checks: u32,
     /// Bytes that a kernel may bind of one buffer; none for the device's limit. A mesh beyond it is split.
     pub binding_bytes: Option<u64>,
 }
 
 impl Default for GpuOptions {
     fn default() -> Self {
-        Self { work_group_size: 64, elements_per_invocation: 1, iterations_per_submission: 32, binding_bytes: None }
+        Self {
+            work_group_size: 64,
+            elements_per_invocation: 1,
+            iterations_per_submission: 32,
+            steps_between_checks: 32,
+            binding_bytes: None,
+        }
     }
 }
 
@@ -48,6 +56,7 @@ impl GpuOptions {
             work_group_size: self.work_group_size.clamp(1, GROUP).next_power_of_two(),
             elements_per_invocation: self.elements_per_invocation.max(1),
             iterations_per_submission: self.iterations_per_submission.max(1),
+            steps_between_checks: self.steps_between_checks.max(1),
             binding_bytes: self.binding_bytes,
         }
     }
@@ -414,6 +423,10 @@ impl Backend for GpuBackend {
 
     fn iterations_between_readings(&self) -> u32 {
         self.options.iterations_per_submission
+    }
+
+    fn steps_between_checks(&self) -> u64 {
+        self.options.steps_between_checks.into()
     }
 
     fn name(&self) -> String {

@@ -50,6 +50,18 @@ pub struct GpuField {
     node_passes: HashMap<bool, Rc<Compiled>>,
     work_group_size: u32,
     elements_per_invocation: u32,
+    domains: Domains,
+}
+
+/// When it is said whether elements are inside their laws' domains.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Domains {
+    /// After each force.
+    AtOnce,
+    /// When it is asked for; no force was computed yet.
+    Deferred,
+    /// When it is asked for; forces keep the margins of elements that are outside.
+    Kept,
 }
 
 /// The buffers of a pass that are not its range's own.
@@ -92,6 +104,7 @@ impl GpuField {
             node_passes: HashMap::new(),
             work_group_size: options.work_group_size,
             elements_per_invocation: options.elements_per_invocation,
+            domains: Domains::AtOnce,
             recorder,
             pages,
             damped,
@@ -170,7 +183,8 @@ impl GpuField {
             let count = range.elements.len();
             let invocations = count.div_ceil(self.elements_per_invocation as usize);
             let groups = self.recorder.groups(invocations, self.work_group_size);
-            self.recorder.dispatch(&compiled.kernel, [count as u32, 0, 0, 0], &storage, groups);
+            let keeps = u32::from(pass == Pass::Force && self.domains == Domains::Kept);
+            self.recorder.dispatch(&compiled.kernel, [count as u32, keeps, 0, 0], &storage, groups);
         }
     }
 
@@ -329,6 +343,18 @@ impl ForceField<GpuBackend> for GpuField {
     fn add_force(&mut self, backend: &GpuBackend, u: &GpuVector, f: &mut GpuVector) -> Result<(), LeftDomain> {
         let bound = Bound { displacement: Some(u.memory()), ..Bound::default() };
         self.passes(backend, (Of::All, Pass::Force), &bound, 1.0, f);
+        if self.domains == Domains::AtOnce {
+            return self.inside(backend);
+        }
+        self.domains = Domains::Kept;
+        Ok(())
+    }
+
+    fn defer_domains(&mut self, defer: bool) {
+        self.domains = if defer { Domains::Deferred } else { Domains::AtOnce };
+    }
+
+    fn check_domains(&mut self, backend: &GpuBackend) -> Result<(), LeftDomain> {
         self.inside(backend)
     }
 

@@ -6,7 +6,8 @@
 
 use std::time::Instant;
 
-use super::{MeasureError, Subject, wave};
+use super::body::displacements;
+use super::{MeasureError, Subject};
 use crate::backend::{Backend, ForceField, Operator, REGISTERS, RUNNING};
 use crate::cg::{CgLimits, ConjugateGradient};
 use crate::model::Model;
@@ -105,9 +106,7 @@ pub(super) fn implicit<B: Backend, F: ForceField<B>>(
     backend: B,
     field: F,
 ) -> Result<Implicit, MeasureError> {
-    let plane = subject.element.info.dimension == 2;
-    let at = |p: &[f64; 3]| if plane { [wave(p)[0], wave(p)[1], 0.0] } else { wave(p) };
-    let u = model.mesh.nodes().iter().map(|p| at(p).map(|u| u / model.scale.length)).collect::<Vec<_>>();
+    let [u, _] = displacements(subject, &model);
     let h = STEP / model.scale.time;
     let repeats = subject.repeats.max(1);
     let System { backend, mut field, masses, body, .. } = System::new(backend, field, model.body);

@@ -3,11 +3,13 @@
 //! Wall-clock times of whole operations, each waited for. Machines are shared and their clocks vary: compare figures of one
 //! call only, as ratios.
 
-mod beam;
+mod body;
 mod count;
 mod implicit;
 mod operations;
 mod peak;
+
+use std::path::PathBuf;
 
 use tensormass_kernels::{ElementEntry, LawEntry};
 
@@ -22,40 +24,59 @@ use crate::scene::{self, SceneError};
 use crate::system::SolveError;
 use crate::target::Target;
 
-pub use beam::{cells, scene_text, wave};
+pub use body::{cells, scene_text, wave};
 use count::Layout;
 pub use implicit::{Implicit, STEP, Solution, TOLERANCE};
 
 /// Iterations of the linear solver in one of its figures.
 pub const ITERATIONS: u32 = 50;
 
+/// The mesh of what is measured.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Body {
+    /// A beam of 5 x 1 x 1 m, or of 5 x 1 m, of so many cells along x, y and z (see [`cells`]).
+    Beam([usize; 3]),
+    /// A mesh file, in metres.
+    File(PathBuf),
+}
+
 /// What is measured.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Subject {
     /// The law.
     pub law: &'static LawEntry,
-    /// What the beam is made of.
+    /// What the body is made of.
     pub element: &'static ElementEntry,
-    /// Cells of the beam along x, y and z (see [`cells`]).
-    pub cells: [usize; 3],
+    /// Its mesh.
+    pub body: Body,
     /// Numbers of state and kernels.
     pub precision: scene::Precision,
     /// Times that an operation is repeated, at least 1.
     pub repeats: usize,
-    /// How many times stiffer the material is in one half of the beam than in the other.
+    /// How many times stiffer the material is in one half of a beam than in the other.
     pub stiffness_ratio: f64,
 }
 
 /// Why nothing was measured.
 #[derive(Debug, thiserror::Error)]
 pub enum MeasureError {
-    /// The beam cannot be built.
+    /// The body cannot be built.
     #[error(transparent)]
     Build(#[from] BuildError),
     /// The device is no good, or has failed.
     #[error(transparent)]
     Device(#[from] DeviceError),
-    /// The beam's small wave is outside the law's domain.
+    /// A mesh has elements of another kind.
+    #[error("{file}: the mesh has elements of kind {found}, and {wanted} is measured; give --element {found}")]
+    Kind {
+        /// The mesh file.
+        file: String,
+        /// What it has.
+        found: &'static str,
+        /// What was asked for.
+        wanted: &'static str,
+    },
+    /// The body's small wave is outside the law's domain.
     #[error(transparent)]
     LeftDomain(#[from] LeftDomain),
     /// A step failed.
@@ -107,9 +128,9 @@ impl Timing {
 /// What was measured of one subject.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
-    /// Nodes of the beam.
+    /// Nodes of the body.
     pub nodes: usize,
-    /// Elements of the beam.
+    /// Elements of the body.
     pub elements: usize,
     /// Its operations.
     pub timings: Vec<Timing>,
@@ -219,6 +240,11 @@ impl Measurement for Step {
 fn on<M: Measurement>(target: &Target, subject: &Subject, measurement: M) -> Result<M::Result, MeasureError> {
     let text = scene_text(subject);
     let model = build(&scene::parse(&text, "bench.toml", &[])?)?;
+    let other = model.body.batches.iter().find(|batch| batch.element.info.name != subject.element.info.name);
+    if let (Body::File(file), Some(other)) = (&subject.body, other) {
+        let (found, wanted) = (other.element.info.name, subject.element.info.name);
+        return Err(MeasureError::Kind { file: file.display().to_string(), found, wanted });
+    }
     match (target, subject.precision) {
         (Target::Cpu, scene::Precision::F32) => on_cpu::<f32, M>(subject, model, measurement),
         (Target::Cpu, scene::Precision::F64) => on_cpu::<f64, M>(subject, model, measurement),

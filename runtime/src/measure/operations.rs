@@ -2,8 +2,9 @@
 
 use std::time::Instant;
 
+use super::body::displacements;
 use super::count::{Count, Layout};
-use super::{ITERATIONS, MeasureError, Measured, Subject, Timing, wave};
+use super::{ITERATIONS, MeasureError, Measured, Subject, Timing};
 use crate::backend::{Backend, ForceField, Operator};
 use crate::body::Body;
 use crate::cg::{CgLimits, ConjugateGradient};
@@ -42,12 +43,7 @@ pub(super) fn all<B: Backend, F: ForceField<B>>(
     let Body { elements, .. } = &model.body;
     let (nodes, elements) = (model.mesh.nodes().len(), elements.len());
     let count = Count { subject, layout, nodes: nodes as f64 / elements as f64 };
-    let plane = subject.element.info.dimension == 2;
-    let at = |p: &[f64; 3]| if plane { [wave(p)[0], wave(p)[1], 0.0] } else { wave(p) };
-    let scaled = |p: &[f64; 3]| at(p).map(|u| u / model.scale.length);
-    let u = backend.upload(&model.mesh.nodes().iter().map(scaled).collect::<Vec<_>>());
-    let direction = |p: &[f64; 3]| at(&[p[1], p[2], p[0]]);
-    let du = backend.upload(&model.mesh.nodes().iter().map(direction).collect::<Vec<_>>());
+    let [u, du] = displacements(subject, &model).map(|u| backend.upload(&u));
     let mut f = backend.zeros();
     let on_cpu = layout.local > 0.0;
     let repeats = subject.repeats.max(1);

@@ -34,7 +34,7 @@ pub struct SceneData {
     pub initial: Initial,
     /// How the equations of motion or of equilibrium are solved.
     pub solver: Solver,
-    /// Numbers to record at every step.
+    /// Numbers to record over time.
     #[serde(default)]
     pub probe: Vec<Probe>,
     /// What is written for viewing.

@@ -5,7 +5,7 @@ use super::selection::Selection;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A number recorded at every step, by its name.
+/// A number recorded over time, by its name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Probe {
@@ -200,15 +200,23 @@ pub struct Output {
     pub every: Option<u32>,
     /// The fields in each frame.
     pub fields: Vec<Field>,
+    /// Probes are recorded every so many steps, and at the first and the last; from 1 to 1000000000.
+    #[schemars(range(min = 1, max = 1_000_000_000))]
+    pub probe_every: u32,
 }
 
 impl Default for Output {
     fn default() -> Self {
-        Self { frames: None, every: None, fields: vec![Field::Displacement] }
+        Self { frames: None, every: None, fields: vec![Field::Displacement], probe_every: 1 }
     }
 }
 
 impl Output {
+    /// Whether probes are recorded after `step` of `steps` steps.
+    pub fn wants_probes(&self, step: u64, steps: u64) -> bool {
+        step == 0 || step == steps || step.is_multiple_of(u64::from(self.probe_every))
+    }
+
     /// Whether the state after `step` of `steps` steps is written (step 0 is the initial state).
     pub fn wants_frame(&self, step: u64, steps: u64) -> bool {
         let ends = step == 0 || step == steps;

@@ -102,33 +102,104 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         results: &mut Results,
         observer: &mut (dyn Observer + Send),
     ) -> Result<Ending, RunError> {
-        for k in 1..=self.steps {
-            let stepped = self.integrator.step(&mut self.system, &mut self.state, self.step);
-            // What a failed device did to a solver is not the reason.
-            let stepped = self.system.backend.check().map_err(SolveError::from).and(stepped);
-            let done = stepped.and_then(|report| {
-                self.cost += report;
-                self.state.step = k;
-                // By multiplication, so that rounding does not add up over the steps.
-                self.state.time = self.step * k as f64;
-                self.system.check_bounded(&self.state)
-            });
-            if let Err(e) = done {
-                if let SolveError::Device(_) = e {
-                    // What the device returned of this step is not known to be good.
-                    (self.state.step, self.state.time) = (k - 1, self.step * (k - 1) as f64);
+        // The step up to which every state is looked at: the first one, then those of a stretch that went wrong.
+        let mut careful = 1;
+        while self.state.step < self.steps {
+            let before = self.state.step;
+            let ahead = if before < careful { 1 } else { self.stretch() };
+            match if ahead == 1 { self.one_step() } else { self.steps_unseen(ahead) } {
+                Ok(()) => {}
+                Err(e) if ahead == 1 || matches!(e, SolveError::Device(_)) => return Ok(Ending::Failed(e)),
+                // Once more, to find the step.
+                Err(_) => {
+                    careful = before + ahead;
+                    continue;
                 }
+            }
+            if self.is_recorded(self.state.step)
+                && let Err(e) = self.record(results)?
+            {
                 return Ok(Ending::Failed(e));
             }
-            if let Err(e) = self.record(results)? {
-                return Ok(Ending::Failed(e));
-            }
-            observer.progress(k, self.steps);
-            if k < self.steps && observer.interrupted() {
+            observer.progress(self.state.step, self.steps);
+            if self.state.step < self.steps && observer.interrupted() {
                 return Ok(Ending::Interrupted);
             }
         }
         Ok(Ending::Done)
+    }
+
+    /// Whether anything is recorded of the state after a step.
+    fn is_recorded(&self, step: u64) -> bool {
+        let output = &self.scene.output;
+        let probes = !self.model.recorder.names().is_empty() || step == self.steps;
+        (probes && output.wants_probes(step, self.steps)) || output.wants_frame(step, self.steps)
+    }
+
+    /// Steps that may be taken before anything is recorded, as many as the backend likes to take without being looked at.
+    fn stretch(&self) -> u64 {
+        if !self.scene.solver.integrator.is_explicit() {
+            return 1;
+        }
+        let most = self.system.backend.steps_between_checks().min(self.steps - self.state.step);
+        (1..most).find(|ahead| self.is_recorded(self.state.step + ahead)).unwrap_or(most)
+    }
+
+    /// Takes a step. After an error the state is the last one that is good.
+    fn one_step(&mut self) -> Result<(), SolveError> {
+        let k = self.state.step + 1;
+        let stepped = self.integrator.step(&mut self.system, &mut self.state, self.step);
+        // What a failed device did to a solver is not the reason.
+        let report = self.system.backend.check().map_err(SolveError::from).and(stepped)?;
+        self.passed(k, report);
+        let bounded = self.system.check_bounded(&self.state);
+        if let Err(SolveError::Device(_)) = bounded {
+            // What the device returned of this step is not known to be good.
+            self.at(k - 1);
+        }
+        bounded
+    }
+
+    /// Takes some steps without looking at the states between. After an error the state is that before all of them.
+    fn steps_unseen(&mut self, ahead: u64) -> Result<(), SolveError> {
+        let backend = &self.system.backend;
+        let (mut u, mut v) = (backend.zeros(), backend.zeros());
+        backend.copy(&self.state.u, &mut u);
+        backend.copy(&self.state.v, &mut v);
+        let (before, cost) = (self.state.step, self.cost);
+        self.system.field.defer_domains(true);
+        let mut stepped = Ok(());
+        for k in before + 1..=before + ahead {
+            match self.integrator.step(&mut self.system, &mut self.state, self.step) {
+                Ok(report) => self.passed(k, report),
+                Err(e) => {
+                    stepped = Err(e);
+                    break;
+                }
+            }
+        }
+        let inside = self.system.field.check_domains(&self.system.backend).map_err(SolveError::from);
+        self.system.field.defer_domains(false);
+        let good = self.system.backend.check().map_err(SolveError::from).and(stepped).and(inside);
+        let good = good.and_then(|()| self.system.check_bounded(&self.state));
+        if good.is_err() {
+            self.system.backend.copy(&u, &mut self.state.u);
+            self.system.backend.copy(&v, &mut self.state.v);
+            self.cost = cost;
+            self.at(before);
+        }
+        good
+    }
+
+    fn passed(&mut self, step: u64, report: StepReport) {
+        self.cost += report;
+        self.at(step);
+    }
+
+    fn at(&mut self, step: u64) {
+        self.state.step = step;
+        // By multiplication, so that rounding does not add up over the steps.
+        self.state.time = self.step * step as f64;
     }
 
     /// Measures the critical steps and warns of a step above them.
@@ -158,18 +229,20 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         }
     }
 
-    /// Records probes, and a frame where the scene wants one.
+    /// Records probes and a frame, where the scene wants them now.
     fn record(&mut self, results: &mut Results) -> Result<Result<(), SolveError>, OutputError> {
-        let snapshot = match self.snapshot(self.model.recorder.needs()) {
-            Ok(snapshot) => snapshot,
-            Err(e) => return Ok(Err(e)),
-        };
         let time = self.state.time * self.model.scale.time;
-        results.last = self.model.recorder.read(&self.model.mesh, &snapshot);
-        if let Some(table) = &mut results.probes {
-            let mut row = vec![time];
-            row.extend(&results.last);
-            table.append(&row)?;
+        if self.scene.output.wants_probes(self.state.step, self.steps) {
+            let snapshot = match self.snapshot(self.model.recorder.needs()) {
+                Ok(snapshot) => snapshot,
+                Err(e) => return Ok(Err(e)),
+            };
+            results.last = self.model.recorder.read(&self.model.mesh, &snapshot);
+            if let Some(table) = &mut results.probes {
+                let mut row = vec![time];
+                row.extend(&results.last);
+                table.append(&row)?;
+            }
         }
         if let Some(frames) = &mut results.frames
             && self.scene.output.wants_frame(self.state.step, self.steps)

@@ -1,9 +1,10 @@
-//! The beam that is measured: its scene, its size, and how it is displaced.
+//! The body that is measured: its scene, its size, and how it is displaced.
 
 use tensormass_kernels::{ElementEntry, ParameterInfo};
 
-use super::Subject;
+use super::{Body, Subject};
 use crate::mesh::beam_of;
+use crate::model::Model;
 use crate::plan::precision_name;
 
 /// A parameter in the middle of its range where it has no default, of a material so many times stiffer than that.
@@ -18,9 +19,15 @@ fn parameter(p: &ParameterInfo, stiffer: f64) -> String {
     format!("{} = {text}", p.name)
 }
 
-/// A scene of a beam of 5 x 1 x 1 m, or of 5 x 1 m, of one law.
+/// A scene of a body of one law.
 pub fn scene_text(subject: &Subject) -> String {
-    let Subject { law, element, cells, precision, stiffness_ratio, .. } = subject;
+    let Subject { law, element, body, precision, stiffness_ratio, .. } = subject;
+    let mesh = match body {
+        Body::Beam(cells) => {
+            format!("beam = {{ size = [5, 1, 1], cells = {cells:?}, element = \"{}\" }}", element.info.name)
+        }
+        Body::File(file) => format!("file = {:?}", file.display().to_string()),
+    };
     let material = |elements: &str, stiffer: f64| {
         let parameters: Vec<String> = law.info.parameters.iter().map(|p| parameter(p, stiffer)).collect();
         format!(
@@ -36,11 +43,27 @@ pub fn scene_text(subject: &Subject) -> String {
         material(&soft, 1.0) + &material(&stiff, *stiffness_ratio)
     };
     format!(
-        "[mesh]\nbeam = {{ size = [5, 1, 1], cells = {cells:?}, element = \"{}\" }}\n{materials}[solver]\n\
-         integrator = \"implicit-euler\"\nprecision = \"{}\"\nstep = 1e-5\nduration = 1e-5\n",
-        element.info.name,
+        "[mesh]\n{mesh}\n{materials}[solver]\nintegrator = \"implicit-euler\"\nprecision = \"{}\"\nstep = 1e-5\n\
+         duration = 1e-5\n",
         precision_name(*precision)
     )
+}
+
+/// The displacement of each node of a subject's body, in scaled units, and one that is turned and not small.
+pub(super) fn displacements(subject: &Subject, model: &Model) -> [Vec<[f64; 3]>; 2] {
+    let plane = subject.element.info.dimension == 2;
+    // Bodies of files have any size.
+    let size = match subject.body {
+        Body::Beam(_) => 1.0,
+        Body::File(_) => model.body.diameter * model.scale.length / 27_f64.sqrt(),
+    };
+    let at = |p: [f64; 3]| {
+        let u = wave(&p.map(|x| x / size)).map(|u| size * u);
+        if plane { [u[0], u[1], 0.0] } else { u }
+    };
+    let nodes = model.mesh.nodes().iter();
+    let turned = nodes.clone().map(|p| at([p[1], p[2], p[0]])).collect();
+    [nodes.map(|p| at(*p).map(|u| u / model.scale.length)).collect(), turned]
 }
 
 /// A small smooth displacement at a place.
