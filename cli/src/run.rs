@@ -31,7 +31,7 @@ pub struct Arguments {
     #[arg(long, value_name = "auto|cpu|gpu|gpu:NAME", default_value_t = DeviceChoice::Auto)]
     device: DeviceChoice,
     /// Measure before the first step how products with the tangent are faster on this CPU; as --set
-    /// solver.cg.tangent=measured. Results do not depend on it.
+    /// solver.cg.tangent=measured. Results depend on it in their last digits only.
     #[arg(long)]
     tune: bool,
     /// Print nothing but errors.

@@ -1,6 +1,7 @@
 //! How products with the tangent are computed on a CPU: from what is stored of the state, or from the state anew.
 //!
-//! Both give the same numbers, bit for bit. Storing saves operations in every product and costs memory that every product
+//! Both give the same numbers to rounding: on registers a product that is stored is rounded where it would be fused with a
+//! sum. Storing saves operations in every product and costs memory that every product
 //! reads: little while it stays in a cache, more than the operations of a cheap law where it does not.
 
 use serde::Serialize;

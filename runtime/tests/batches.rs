@@ -157,11 +157,22 @@ fn threads_change_nothing() {
     }
 }
 
-/// What is stored of tangents is what is computed anew, whichever is measured to be faster.
+/// What is stored of tangents is what is computed anew, whichever is measured to be faster, but for rounding: of some hundred
+/// operations of a product, which a solution of a beam of this condition makes a hundred times larger at most.
 #[test]
-fn tangents_change_nothing() {
-    for tangent in ["recomputed", "measured"] {
-        check("tangents", &Swing { tangent: "stored", ..SWING }, &Swing { tangent, ..SWING });
+fn tangents_change_nothing_but_rounding() {
+    for (precision, unit) in [("f64", f64::EPSILON / 2.0), ("f32", f64::from(f32::EPSILON) / 2.0)] {
+        let values = |tangent| {
+            let bits = Swing { precision, tangent, ..SWING }.bits();
+            bits.into_iter().map(|(name, bits)| (name, f64::from_bits(bits))).collect::<Vec<_>>()
+        };
+        let stored = values("stored");
+        for tangent in ["recomputed", "measured"] {
+            for ((name, value), (_, wanted)) in values(tangent).iter().zip(&stored) {
+                let error = (value / wanted - 1.0).abs();
+                assert!(error <= 1e4 * unit, "{name}, {precision}: {tangent} is off by {error:e}");
+            }
+        }
     }
 }
 

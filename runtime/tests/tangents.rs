@@ -1,5 +1,5 @@
-//! How products with the tangent are computed: what the rule takes, what plans and summaries say of it. That results do not
-//! depend on it is a test of `batches.rs`.
+//! How products with the tangent are computed: what the rule takes, what plans and summaries say of it. That results
+//! depend on it in their last digits only is a test of `batches.rs`.
 
 mod support;
 

@@ -12,6 +12,7 @@ use crate::integrate::SemiImplicitEuler;
 use crate::model::Model;
 use crate::plan::{operations, tangent_operations};
 use crate::system::{Integrator, System};
+use crate::tangent::{Tangent, by_rule};
 
 /// Times an operation, after one that is not counted; it waits until it is done, and says what its time is to be multiplied
 /// by.
@@ -75,15 +76,17 @@ pub(super) fn all<B: Backend, F: ForceField<B>>(
         field.add_diagonal(&backend, 1.0, &mut f);
         done(&backend)
     })?;
-    let stored = if on_cpu { subject.law.info.stored } else { 0 };
+    // What the rule takes, as the field does.
+    let stores = on_cpu && by_rule(&model.body, layout.real as usize).contains(&Tangent::Stored);
+    let stored = if stores { subject.law.info.stored } else { 0 };
     let counted = |timing, flops, bytes| Timing { flops: Some(flops), bytes: Some(bytes), ..timing };
     let (contract, apply_flops) = (subject.element.info.contract_operations, tangent_operations(subject.law.info));
-    let of_apply = match on_cpu {
+    let of_apply = match stores {
         true => operations(subject.element.info, 1, apply_flops + contract),
         false => count.flops(vectors, "dforce", 1, true),
     };
-    // A device that stores nothing copies the state, and has to read it again.
-    let applied = if on_cpu { 1 } else { vectors };
+    // Who stores nothing copies the state, and has to read it again.
+    let applied = if stores { 1 } else { vectors };
     let written = count.layout.real * (stored * subject.element.info.points.len()) as f64;
     let of_linearize = if stored > 0 { count.flops(1, "linearize", 1, false) } else { 0 };
     let mut timings = vec![

@@ -484,7 +484,7 @@ pub struct ConjugateGradient {
     pub max_iterations: u32,
     /// What the residual is multiplied by before each search direction.
     pub preconditioner: Preconditioner,
-    /// How products with the tangent are computed on a CPU; results do not depend on it.
+    /// How products with the tangent are computed on a CPU; results depend on it in their last digits only.
     pub tangent: TangentChoice,
 }
 
@@ -519,7 +519,7 @@ pub enum TangentChoice {
     Stored,
     /// Everything is computed in each product.
     Recomputed,
-    /// As is faster: measured before the first step.
+    /// As is faster: measured before the first step. Two runs may then differ in their last digits.
     Measured,
 }
 

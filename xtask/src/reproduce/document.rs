@@ -58,7 +58,7 @@ pub fn document(results: &Results) -> String {
              need T: *relative* is in semi-implicit steps, of which the paper's is the mean of three. The totals of the \
              last three rows are printed in whole seconds, so their ratios are known to 10, 25 and 50 %.\n\n\
              Ours are of the first 500 steps at most, the fastest of three runs, without probes (a probe of the modulus costs one force evaluation a \
-             step, and probes cannot be thinned), less the time of a run of one step, and still move with what else the machine does. *Products* are those of the tangent \
+             step), less the time of a run of one step, and still move with what else the machine does. *Products* are those of the tangent \
              with a vector, in each step.\n\n";
     text +=
         "## One axis at a time\n\nOn the CPU; what is not said is as in the tables. Errors are relative to 100 MPa.\n";
