@@ -7,8 +7,10 @@ use tensormass_runtime::measure::{Measured, Subject};
 use tensormass_runtime::plan::precision_name;
 use tensormass_runtime::scene::Precision;
 
-/// Of the picture.
-const SIZE: [f64; 2] = [760.0, 520.0];
+/// Of the picture: the width, and the height unless the list of dots needs more.
+const SIZE: [f64; 2] = [880.0, 520.0];
+/// Of a row of the list.
+const ROW: f64 = 14.0;
 /// Of what is drawn in it: left, top, right, bottom.
 const FRAME: [f64; 4] = [70.0, 40.0, 560.0, 460.0];
 
@@ -55,7 +57,8 @@ pub(super) fn picture(bandwidth: f64, peaks: &[(Precision, f64)], dots: &[Dot]) 
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" font-family=\"sans-serif\" font-size=\"11\">\n\
          <rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
-        SIZE[0], SIZE[1]
+        SIZE[0],
+        SIZE[1].max(FRAME[1] + ROW * (dots.len() + 1) as f64)
     );
     let mut line = |from: [f64; 2], to: [f64; 2], style: &str| {
         let ([x1, y1], [x2, y2]) = (from, to);
@@ -96,7 +99,7 @@ pub(super) fn picture(bandwidth: f64, peaks: &[(Precision, f64)], dots: &[Dot]) 
         let (x, y) = (x(dot.intensity), y(dot.rate / 1e9));
         let _ = writeln!(labels, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"{fill}\"/>");
         let _ = writeln!(labels, "<text x=\"{:.1}\" y=\"{:.1}\" font-size=\"9\">{}</text>", x + 5.0, y - 3.0, k + 1);
-        let row = top + 14.0 * k as f64;
+        let row = top + ROW * k as f64;
         let _ = writeln!(
             labels,
             "<text x=\"{:.1}\" y=\"{row:.1}\" font-size=\"9\" fill=\"{fill}\">{} {}</text>",
