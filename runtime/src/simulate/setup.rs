@@ -74,9 +74,9 @@ pub(super) fn with_tangents<R: Precision>(
     if scene.solver.integrator.is_explicit() || scene.solver.cg.tangent != scene::TangentChoice::Measured {
         return (field.with_tangents(&tangents), tangents, by);
     }
-    let all = |tangent| vec![tangent; body.batches.len()];
-    let mut candidates = vec![tangents, all(Tangent::Stored), all(Tangent::Recomputed)];
-    candidates.dedup();
+    let others = [Tangent::Stored, Tangent::Recomputed].map(|tangent| vec![tangent; body.batches.len()]);
+    let others = others.into_iter().filter(|other| *other != tangents);
+    let mut candidates: Vec<_> = std::iter::once(tangents.clone()).chain(others).collect();
     let (field, fastest) = fastest(backend, field, &candidates);
     (field, candidates.swap_remove(fastest), ChosenBy::Measurement)
 }
