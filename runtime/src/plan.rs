@@ -119,10 +119,7 @@ impl Plan {
         let margins: usize = with_domain.map(|b| b.elements.len()).sum();
         let buffers = match layout {
             Layout::Cpu => {
-                let real = match scene.solver.precision {
-                    Precision::F32 => 4,
-                    Precision::F64 => 8,
-                };
+                let real = scene.solver.precision.bytes();
                 // Each node has a partial force, and one for each cluster to which it is foreign; a number both ways, and
                 // where the numbers of a shared node are.
                 let Sharing { foreign, shared } = sharing(&model.body);

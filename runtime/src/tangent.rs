@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::body::{Body, LawBatch};
 use crate::plan::{point_operations, tangent_operations};
-use crate::scene::{Precision, Scene, TangentChoice};
+use crate::scene::{Scene, TangentChoice};
 
 /// How products with a law's tangent are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -56,14 +56,12 @@ pub enum ChosenBy {
 
 /// What a scene asks for, for each law of its body; the rule's choice where it asks for a measurement.
 pub fn asked_for(scene: &Scene, body: &Body) -> (Vec<Tangent>, ChosenBy) {
-    let real = match scene.solver.precision {
-        Precision::F32 => 4,
-        Precision::F64 => 8,
-    };
     let all = |tangent| (vec![tangent; body.batches.len()], ChosenBy::Scene);
     match scene.solver.cg.tangent {
         TangentChoice::Stored => all(Tangent::Stored),
         TangentChoice::Recomputed => all(Tangent::Recomputed),
-        TangentChoice::Auto | TangentChoice::Measured => (by_rule(body, real), ChosenBy::Rule),
+        TangentChoice::Auto | TangentChoice::Measured => {
+            (by_rule(body, scene.solver.precision.bytes()), ChosenBy::Rule)
+        }
     }
 }

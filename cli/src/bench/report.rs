@@ -81,7 +81,7 @@ pub(super) fn implicit_as_text(subject: &Subject, implicit: &Implicit) -> String
     let ms = |s: f64| format!("{:.3}", 1e3 * s);
     let mut rows = vec![["", "iterations", "residual", "median ms", "min", "max"].map(String::from).to_vec()];
     for s in &implicit.solutions {
-        let (median, last) = (s.seconds[s.seconds.len() / 2], s.seconds[s.seconds.len() - 1]);
+        let (median, last) = (s.median(), s.seconds[s.seconds.len() - 1]);
         let residual = format!("{:.1e}", s.residual);
         let reached = if s.residual <= TOLERANCE { "" } else { " (not reached)" };
         let name = format!("{}{reached}", s.preconditioner);
@@ -109,7 +109,7 @@ pub(super) fn implicit_as_json(subject: &Subject, implicit: &Implicit) -> Value 
         .map(|s| {
             json!({
                 "preconditioner": s.preconditioner, "iterations": s.iterations, "residual": s.residual,
-                "seconds": s.seconds, "median_s": s.seconds[s.seconds.len() / 2],
+                "seconds": s.seconds, "median_s": s.median(),
             })
         })
         .collect();

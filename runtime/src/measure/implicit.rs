@@ -7,7 +7,7 @@
 use std::time::Instant;
 
 use super::body::displacements;
-use super::{MeasureError, Subject};
+use super::{MeasureError, Subject, median};
 use crate::backend::{Backend, ForceField, Operator, REGISTERS, RUNNING};
 use crate::cg::{CgLimits, ConjugateGradient};
 use crate::model::Model;
@@ -42,9 +42,17 @@ pub struct Implicit {
     pub parts: Vec<(&'static str, f64)>,
 }
 
-fn median(mut seconds: Vec<f64>) -> f64 {
+impl Solution {
+    /// The median time in seconds.
+    pub fn median(&self) -> f64 {
+        median(&self.seconds)
+    }
+}
+
+/// The median of times in any order.
+fn median_of(mut seconds: Vec<f64>) -> f64 {
     seconds.sort_by(f64::total_cmp);
-    seconds[seconds.len() / 2]
+    median(&seconds)
 }
 
 /// Solves one system as often as asked.
@@ -166,9 +174,9 @@ pub(super) fn implicit<B: Backend, F: ForceField<B>>(
         backend.wait()?;
         products.push(start.elapsed().as_secs_f64());
     }
-    let solution = solutions[0].seconds[repeats / 2];
-    let products = median(products).min(solution);
-    let [forces, linearization, preconditioner] = parts.map(median);
+    let solution = solutions[0].median();
+    let products = median_of(products).min(solution);
+    let [forces, linearization, preconditioner] = parts.map(median_of);
     let parts = vec![
         ("forces", forces),
         ("linearization", linearization),

@@ -121,7 +121,7 @@ impl Timing {
 
     /// The median time in seconds.
     pub fn median(&self) -> f64 {
-        self.seconds[self.seconds.len() / 2]
+        median(&self.seconds)
     }
 }
 
@@ -186,6 +186,11 @@ impl Bench {
     pub fn implicit(&self, target: &Target, subject: &Subject) -> Result<Implicit, MeasureError> {
         self.pool.install(|| on(target, subject, Step))
     }
+}
+
+/// The middle one of ascending times.
+fn median(ascending: &[f64]) -> f64 {
+    ascending[ascending.len() / 2]
 }
 
 /// What is measured on a backend.

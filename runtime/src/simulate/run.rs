@@ -216,11 +216,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         self.limits = Some(limits);
         observer.limits(limits);
         let step = self.step * unit;
-        let explicit = matches!(
-            self.scene.solver.integrator,
-            scene::Integrator::SemiImplicitEuler | scene::Integrator::CentralDifference
-        );
-        if explicit && step > limits.power {
+        if self.scene.solver.integrator.is_explicit() && step > limits.power {
             self.warnings.push(format!(
                 "the step {step:.4e} s is above the critical step {:.4e} s (power iteration): the simulation will blow up; \
                  a step below {:.4e} s (element bound) is safe at rest",
