@@ -2,7 +2,7 @@
 
 use tensormass_runtime::measure::{Body, Subject, scene_text};
 use tensormass_runtime::model::{Model, build};
-use tensormass_runtime::scene::{Precision, parse};
+use tensormass_runtime::scene::{Precision, TangentChoice, parse};
 use tensormass_runtime::{LawEntry, linear_tetrahedron};
 
 pub use tensormass_runtime::measure::wave;
@@ -12,9 +12,16 @@ pub use tensormass_runtime::measure::wave;
 /// # Panics
 /// Never: the scene is right.
 pub fn beam(law: &'static LawEntry, cells: [usize; 3]) -> Model {
-    let (element, precision) = (linear_tetrahedron(), Precision::F64);
-    let text =
-        scene_text(&Subject { law, element, body: Body::Beam(cells), precision, repeats: 1, stiffness_ratio: 1.0 });
+    let subject = Subject {
+        law,
+        element: linear_tetrahedron(),
+        body: Body::Beam(cells),
+        precision: Precision::F64,
+        repeats: 1,
+        stiffness_ratio: 1.0,
+        tangent: TangentChoice::Auto,
+    };
+    let text = scene_text(&subject);
     let scene = parse(&text, "bench.toml", &[]).expect("the scene is right");
     build(&scene).expect("the scene can be built")
 }

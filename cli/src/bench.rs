@@ -13,7 +13,7 @@ use tensormass_runtime::device::DeviceChoice;
 use tensormass_runtime::gpu::GpuOptions;
 use tensormass_runtime::measure::{self, Bench, Body, MeasureError, Subject};
 use tensormass_runtime::plan::precision_name;
-use tensormass_runtime::scene::Precision;
+use tensormass_runtime::scene::{Precision, TangentChoice};
 use tensormass_runtime::target::Target;
 use tensormass_runtime::{LawEntry, elements, law, laws, linear_tetrahedron};
 
@@ -53,6 +53,9 @@ pub struct Arguments {
     /// How many times stiffer the material is in one half of the beam than in the other.
     #[arg(long, value_name = "RATIO", default_value_t = 1.0, value_parser = ratio)]
     stiffness_ratio: f64,
+    /// How products with the tangent are computed on a CPU, as `solver.cg.tangent` of scenes.
+    #[arg(long, value_name = "auto|stored|recomputed|assembled", default_value = "auto", value_parser = tangent)]
+    tangent: TangentChoice,
     /// Invocations of a GPU's work group, a power of two up to 256; others if given again [default: 64].
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=256))]
     work_group: Vec<u32>,
@@ -98,6 +101,13 @@ fn precision(text: &str) -> Result<Precision, String> {
         .ok_or_else(|| "precisions are f32 and f64".to_string())
 }
 
+fn tangent(text: &str) -> Result<TangentChoice, String> {
+    let all = TangentChoice::ALL.into_iter().filter(|choice| *choice != TangentChoice::Measured);
+    all.into_iter()
+        .find(|choice| choice.name() == text)
+        .ok_or_else(|| "tangents are auto, stored, recomputed and assembled".to_string())
+}
+
 /// Measures and prints.
 pub fn call(arguments: &Arguments) -> Result<(), Failure> {
     let chosen: Vec<&'static LawEntry> = if arguments.laws.is_empty() {
@@ -132,8 +142,8 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
             for body in &bodies {
                 for &law in &chosen {
                     let (repeats, stiffness_ratio) = (arguments.repeats as usize, arguments.stiffness_ratio);
-                    let body = body.clone();
-                    let subject = Subject { law, element, body, precision, repeats, stiffness_ratio };
+                    let (body, tangent) = (body.clone(), arguments.tangent);
+                    let subject = Subject { law, element, body, precision, repeats, stiffness_ratio, tangent };
                     subjects.push((target.clone(), subject));
                 }
             }

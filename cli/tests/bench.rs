@@ -30,7 +30,7 @@ fn number(value: &Value) -> f64 {
 fn every_operation_is_measured_and_counted() {
     let precisions = ["--precision", "f32", "--precision", "f64"];
     let laws = ["--law", "hooke", "--law", "st_venant_kirchhoff"];
-    let found = json(&[&SMALL[..], &precisions, &laws].concat());
+    let found = json(&[&SMALL[..], &precisions, &laws, &["--tangent", "stored"]].concat());
     assert!(number(&found["triad_bytes_per_s"]) > 0.0 && number(&found["threads"]) >= 1.0);
     let measured = found["measured"].as_array().expect("a list");
     assert_eq!(measured.len(), 4, "two laws in two precisions");
@@ -66,6 +66,20 @@ fn every_operation_is_measured_and_counted() {
         let stored = if one["law"] == "hooke" { 0.0 } else { 12.0 };
         assert!((bytes(4) - bytes(1) - stored * real).abs() < 1e-9, "{}", bytes(4));
     }
+}
+
+/// 99 nodes are joined by 222 edges along the axes, 164 diagonals of faces and 40 of cells: blocks of 9 numbers and a place,
+/// each of which serves two nodes, but for those of nodes with themselves.
+#[test]
+fn products_with_a_matrix_are_counted_by_its_blocks() {
+    let found = json(&[&SMALL[..], &["--law", "st_venant_kirchhoff", "--tangent", "assembled"]].concat());
+    let timings = &found["measured"][0]["timings"];
+    assert!(timings[3]["flops_per_element"].is_null(), "assembly is more than kernels");
+    let blocks = f64::from(99 + 222 + 164 + 40);
+    let flops = (18.0 * (2.0 * blocks - 99.0) / 240.0).round();
+    assert_eq!(number(&timings[4]["flops_per_element"]), flops);
+    let bytes = (38.0 * blocks + 99.0 * 5.0 * 12.0) / 240.0;
+    assert!((number(&timings[4]["bytes_per_element"]) - bytes).abs() < 1e-9, "{}", timings[4]);
 }
 
 #[test]

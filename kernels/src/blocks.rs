@@ -100,6 +100,14 @@ impl<R> Part<'_, R> {
     pub(crate) fn len(&self) -> usize {
         self.elements.div_ceil(self.blocks.lanes)
     }
+
+    /// The nodes of the elements of each block, numbered within the cluster: those of one node of an element after the
+    /// other, lane after lane.
+    pub fn nodes(&self) -> impl Iterator<Item = Vec<u32>> {
+        let of_block = self.blocks.nodes * self.blocks.lanes;
+        let places = self.blocks.places.all()[self.first * of_block..][..self.len() * of_block].chunks_exact(of_block);
+        places.map(|places| places.iter().map(|place| u32::from(*place) / stride::<R>() as u32).collect())
+    }
 }
 
 /// The most nodes that the places of a cluster can tell apart.
@@ -191,7 +199,7 @@ impl<R> Blocks<R> {
     }
 
     /// Nodes of an element.
-    pub(crate) fn nodes(&self) -> usize {
+    pub fn nodes(&self) -> usize {
         self.nodes
     }
 

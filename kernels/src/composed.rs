@@ -3,10 +3,12 @@
 //! Laws and elements meet through function pointers, some blocks at a time, so that what is compiled is the sum of the
 //! two, not the product: G and P stay in the innermost cache.
 
+use crate::assembly::{Pair, pairs};
 use crate::blocks::{Blocks, Part, States};
 use crate::element::{ElementEntry, ElementInfo, ElementKernels, Elements, Table};
 use crate::lanes::{Engine, Lanes, Node, Registers};
 use crate::law::LawEntry;
+use crate::matrix::{MultiplyKernel, Rows};
 use crate::point::{DampingPointKernels, Material, Outside, PointKernels};
 use crate::table::{Precision, Tabled};
 
@@ -33,6 +35,15 @@ pub trait Compute<R>: Send + Sync {
     fn linearize(&self, part: Part<R>, u: &[Node<R>], states: &mut [R]);
     /// What was stored of u ([`States::of`]) and increments du -> the differentials of [`Compute::dforce`], added to df.
     fn apply(&self, part: Part<R>, states: &[R], du: &[Node<R>], df: &mut [Node<R>]);
+    /// Displacements u -> what the force of each node of an element changes by with the displacement of each: row a of a
+    /// pair has component a by those of the displacement. `places` says for each of [`crate::pairs`] of the nodes of a
+    /// block's elements, lane after lane, what in `out` it is added to, as [`crate::block_place`] gives it.
+    ///
+    /// # Panics
+    /// A place is beyond `out`, or there is none for an element.
+    fn assemble(&self, part: Part<R>, u: &[Node<R>], places: &[u32], out: &mut [Pair<R>]);
+    /// A x with the rows that a cluster has of a symmetric matrix, added to y.
+    fn multiply(&self, rows: &Rows<R>, x: &[Node<R>], y: &mut [Node<R>]);
     /// Displacements u -> the diagonal of the tangent stiffness -df/du, added to d.
     fn diagonal(&self, part: Part<R>, u: &[Node<R>], d: &mut [Node<R>]);
     /// Displacements u -> each element's Cauchy stress, the mean over its volume at rest.
@@ -65,6 +76,7 @@ struct Composed<V: Lanes> {
     law: PointKernels<V>,
     damping: Option<DampingPointKernels<V>>,
     table: Table<V>,
+    multiply: MultiplyKernel<V>,
     /// Numbers stored of a point's state.
     stored: usize,
 }
@@ -77,6 +89,7 @@ impl<V: Tabled> Composed<V> {
             law: V::law(&law.kernels),
             damping: law.damping.as_ref().map(|damping| V::damping(&damping.kernels)),
             table: Table::new(element.info),
+            multiply: V::multiply(),
             stored: law.info.stored,
         }
     }
@@ -252,6 +265,37 @@ impl<V: Tabled> Compute<V::Scalar> for Composed<V> {
             (self.law.apply)(&material, states, &dg[..points], &mut stress[..points]);
             (self.element.contract)(&elements, &stress, df);
         });
+    }
+
+    fn assemble(&self, part: Part<V::Scalar>, u: &[Node<V::Scalar>], places: &[u32], out: &mut [Pair<V::Scalar>]) {
+        let ([mut g, mut unit], mut tangents) = (self.tensors(), self.tensors::<9>());
+        let mut states = vec![V::Scalar::default(); self.group() * self.of_block()];
+        let mut gradients = vec![[V::from_f64(0.0); 3]; self.group() * self.info.points.len() * self.info.nodes];
+        let of_block = pairs(self.info.nodes).count() * V::COUNT;
+        self.groups(part, |before, elements, material| {
+            let points = elements.count * material.points;
+            (self.element.gradient)(&elements, [u], [&mut g]);
+            (self.law.linearize)(&material, &g[..points], &mut states);
+            for (k, tangent) in tangents.iter_mut().enumerate() {
+                unit[..points].iter_mut().for_each(|dg| dg[k] = V::from_f64(1.0));
+                (self.law.apply)(&material, &states, &unit[..points], &mut tangent[..points]);
+                unit[..points].iter_mut().for_each(|dg| dg[k] = V::from_f64(0.0));
+            }
+            (self.element.node_gradients)(&elements, &mut gradients);
+            let places = &places[before / V::COUNT * of_block..][..elements.count * of_block];
+            (self.element.assemble)(
+                &elements,
+                self.info.dimension,
+                &tangents.each_ref().map(Vec::as_slice),
+                &gradients,
+                places,
+                out,
+            );
+        });
+    }
+
+    fn multiply(&self, rows: &Rows<V::Scalar>, x: &[Node<V::Scalar>], y: &mut [Node<V::Scalar>]) {
+        (self.multiply)(rows, x, y);
     }
 
     fn diagonal(&self, part: Part<V::Scalar>, u: &[Node<V::Scalar>], d: &mut [Node<V::Scalar>]) {

@@ -4,6 +4,7 @@
 //! grad Lambda_j = J^-T dLambda_j/dxi: the slopes dLambda_j/dxi are a table of the element, J^-1 and the weight are data
 //! of the point.
 
+use crate::assembly::AssemblyKernel;
 use crate::blocks::Blocks;
 use crate::lanes::{Lanes, Node};
 use crate::real::Real;
@@ -209,6 +210,8 @@ pub struct ElementKernels<V: Lanes> {
     pub(crate) integrate: fn(&Elements<V>, &[V], &mut [V]),
     /// The mean over each element's volume of a tensor.
     pub(crate) mean: MeanKernel<V>,
+    /// Blocks of the tangent.
+    pub(crate) assemble: AssemblyKernel<V>,
 }
 
 /// An element of this build.

@@ -9,23 +9,27 @@
 extern crate self as tensormass_kernels;
 
 mod aligned;
+mod assembly;
 mod blocks;
 mod composed;
 pub mod damping;
 pub mod element;
 mod lanes;
 mod law;
+mod matrix;
 pub mod point;
 mod real;
 pub mod shader;
 mod table;
 
+pub use assembly::{Pair, block_place, pairs};
 pub use blocks::{Blocks, Cluster, Part, States, most_nodes};
 pub use composed::{Compute, compose};
 pub use damping::{DampingEntry, Dissipative};
 pub use element::{Element, ElementEntry, ElementInfo, Face, Numbering, ReferencePoint, RestPoint, Term};
 pub use lanes::{Chains, Engine, Lanes, Node};
 pub use law::{Acceptance, Law, LawEntry, LawInfo, LawSource, Operations, ParameterInfo, Structure};
+pub use matrix::{Matrix, Rows};
 pub use real::Real;
 pub use table::Precision;
 // Generated text computes constants in it.

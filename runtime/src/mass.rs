@@ -35,6 +35,21 @@ pub struct MassMatrix {
 }
 
 impl MassMatrix {
+    /// The matrix with the row and the column of each node at its place; the entries of a row keep their order.
+    pub fn placed(&self, places: &[u32]) -> Self {
+        let mut node_at = vec![0; places.len()];
+        places.iter().enumerate().for_each(|(node, place)| node_at[*place as usize] = node);
+        let mut placed = Self { offsets: vec![0], columns: vec![], values: vec![] };
+        for node in node_at {
+            let row = self.row(node);
+            placed.columns.extend(self.columns[row.clone()].iter().map(|n| places[*n as usize]));
+            placed.values.extend_from_slice(&self.values[row]);
+            // `as u32` is exact: there are as many entries as in the matrix.
+            placed.offsets.push(placed.columns.len() as u32);
+        }
+        placed
+    }
+
     /// The consistent mass of a mesh from the density of each element, lengths divided by `length`; none if it has more
     /// entries than a `u32` counts.
     pub fn assemble(mesh: &Mesh, densities: &[f64], length: f64) -> Option<Self> {

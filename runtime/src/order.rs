@@ -3,7 +3,9 @@
 //! Recursive coordinate bisection (Berger & Bokhari 1987): elements are halved by their centres along the longest side of
 //! the box around them, until what is left is a cluster. The order depends on nothing but the mesh.
 
-use crate::body::Body;
+use tensormass_kernels::pairs;
+
+use crate::body::{Body, Constraint, LawBatch};
 
 /// Nodes that the elements of a cluster name, each as often as it is named: so many vectors stay in the innermost cache.
 const NAMED: usize = 4096;
@@ -81,6 +83,22 @@ pub fn sharing(body: &Body) -> Sharing {
     Sharing { foreign: foreign.clone().sum(), shared: foreign.filter(|n| *n > 0).count() }
 }
 
+/// Pairs of nodes that elements of a batch join, those of a node with itself among them, one counted for each cluster that
+/// has it.
+pub fn blocks_of_clusters(body: &Body, batch: &LawBatch) -> usize {
+    let info = batch.element.info;
+    let distinct = |elements: &[u32]| {
+        let mut keys = vec![];
+        for nodes in elements.iter().map(|e| &body.elements[*e as usize]) {
+            keys.extend(pairs(info.nodes).map(|[i, j]| [nodes[i].min(nodes[j]), nodes[i].max(nodes[j])]));
+        }
+        keys.sort_unstable();
+        keys.dedup();
+        keys.len()
+    };
+    batch.elements.chunks(cluster_size(info.nodes, batch.elements.len())).map(distinct).sum()
+}
+
 /// The place of each node where they are numbered as the clusters of a body, one batch after the other, first meet them;
 /// nodes of no element are the last.
 pub fn node_places(body: &Body) -> Vec<u32> {
@@ -96,4 +114,48 @@ pub fn node_places(body: &Body) -> Vec<u32> {
         }
     }
     places
+}
+
+/// The imposed components of a body by the places of their nodes, ascending.
+pub fn placed_constraints(body: &Body, places: &[u32]) -> Vec<Constraint> {
+    let place = |c: &Constraint| Constraint { node: places[c.node as usize], ..*c };
+    let mut constraints: Vec<Constraint> = body.constraints.iter().map(place).collect();
+    constraints.sort_unstable_by_key(|c| (c.node, c.component));
+    constraints
+}
+
+/// An order of a body's elements and nodes for devices without clusters.
+#[derive(Debug, Clone)]
+pub struct DeviceOrder {
+    /// Of each batch, places of its elements in the batch, in the order in which they are computed.
+    pub elements: Vec<Vec<u32>>,
+    /// The place of each node in vectors.
+    pub places: Vec<u32>,
+}
+
+/// Nodes by which those of an element may differ in a mesh that is numbered layer by layer: so many times those of a layer
+/// of a cube.
+const LAYERS: f64 = 4.0;
+
+impl DeviceOrder {
+    /// The mesh's own order where that sweeps through the body layer by layer: what is read and written then are a few runs
+    /// through memory. Otherwise that of clusters and of nodes as they meet them.
+    pub fn of(body: &Body) -> Self {
+        let span = |nodes: &[u32]| {
+            let ends = nodes.iter().fold((u32::MAX, 0), |(low, high), n| (low.min(*n), high.max(*n)));
+            f64::from(ends.1.saturating_sub(ends.0))
+        };
+        let spans: f64 = (0..body.elements.len()).map(|e| span(&body.elements[e])).sum();
+        let layer = (body.masses.len() as f64).powf(2.0 / 3.0);
+        let sweeps = spans <= LAYERS * layer * body.elements.len() as f64;
+        let of_batch = |batch: &LawBatch| {
+            let mut places: Vec<u32> = (0..batch.elements.len() as u32).collect();
+            if sweeps {
+                places.sort_unstable_by_key(|place| batch.elements[*place as usize]);
+            }
+            places
+        };
+        let places = if sweeps { (0..body.masses.len() as u32).collect() } else { node_places(body) };
+        Self { elements: body.batches.iter().map(of_batch).collect(), places }
+    }
 }

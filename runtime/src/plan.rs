@@ -1,14 +1,14 @@
 //! What a scene will compute, and what it leaves out: laws, kernels, passes, memory.
 
 use serde_json::{Value, json};
-use tensormass_kernels::{ElementInfo, LawEntry, LawInfo};
+use tensormass_kernels::{ElementInfo, LawEntry, LawInfo, pairs};
 
 use crate::body::LawBatch;
 use crate::mesh::Quality;
 use crate::model::Model;
-use crate::order::{Sharing, sharing};
+use crate::order::{Sharing, blocks_of_clusters, sharing};
 use crate::scene::{Integrator, Precision, Scene};
-use crate::tangent::{self, Tangent};
+use crate::tangent::{self, Tangent, blocks};
 
 /// How buffers are laid out: they differ between the CPU and GPUs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -126,6 +126,16 @@ impl Plan {
                 let of_points = |b: &LawBatch| b.elements.len() * b.element.info.points.len();
                 let storing = model.body.batches.iter().zip(&tangents).filter(|(_, t)| **t == Some(Tangent::Stored));
                 let stored: usize = storing.map(|(b, _)| b.law.info.stored * of_points(b)).sum();
+                let assembled =
+                    model.body.batches.iter().zip(&tangents).filter(|(_, t)| **t == Some(Tangent::Assembled));
+                // Numbers and columns of blocks, slots of those that clusters share; and where an element's blocks are.
+                let matrix = |b: &LawBatch| {
+                    let (own, places) =
+                        (blocks(&model.body, b), pairs(b.element.info.nodes).count() * b.elements.len());
+                    let foreign = blocks_of_clusters(&model.body, b) - own;
+                    (9 * real + 2) * own + (9 * real + 8) * foreign + 4 * places
+                };
+                let assembled = assembled.map(|(b, _)| matrix(b)).sum();
                 vec![
                     ("element nodes", 2 * slots),
                     ("rest data", 10 * real * points),
@@ -133,6 +143,7 @@ impl Plan {
                     ("partial forces", 3 * real * (nodes + foreign)),
                     ("nodes of clusters, slots of nodes", 8 * foreign + 12 * shared + 4 * nodes),
                     ("stored tangent", real * stored),
+                    ("assembled tangent", assembled),
                     ("state and work vectors", vectors * 3 * real * nodes),
                     ("consistent mass", (4 + real) * entries + 4 * rows),
                 ]
@@ -142,7 +153,7 @@ impl Plan {
                 ("rest data", 48 * points + 16 * slopes),
                 ("material constants", 4 * constants),
                 ("partial forces", 16 * slots),
-                ("slots of elements and nodes", 16 * fours + 4 * (nodes + 1)),
+                ("slots of nodes", 4 * (slots + nodes + 1)),
                 ("margins of domains", 4 * margins),
                 ("state and work vectors", (vectors + 1) * 16 * nodes),
                 ("consistent mass", 8 * entries + 4 * rows),
@@ -164,11 +175,17 @@ impl Plan {
             if model.body.batches.iter().zip(&tangents).any(stores) {
                 passes.push("elements: what is stored of the tangent");
             }
+            if tangents.contains(&Some(Tangent::Assembled)) {
+                passes.push("elements: partial blocks of the tangent, pairs of nodes: sum of slots");
+            }
             passes.push("elements: diagonal");
             if viscous {
                 passes.push("elements: diagonal of damping, nodes: sum of slots");
             }
             match layout {
+                Layout::Cpu if tangents.iter().all(|t| *t == Some(Tangent::Assembled)) => {
+                    passes.push("CG: pairs of nodes: partial products with the assembled tangent, nodes: sum, vectors");
+                }
                 Layout::Cpu => passes.push("CG: elements: partial force differentials, nodes: sum, vectors"),
                 Layout::Gpu => passes.extend([
                     "CG iteration 1: elements: partial force differentials",
@@ -246,6 +263,13 @@ pub(crate) fn tangent_operations(law: &LawInfo) -> u32 {
     own.map_or_else(|| point_operations(law, "dforce"), |o| o.arithmetic())
 }
 
+/// Operations of the blocks of the tangent between an element's nodes at a point: dP for each unit gradient, from what
+/// [`tangent_operations`] begins with; its products with the gradient of each node, and theirs with that of each other.
+fn assembly_operations(law: &LawInfo, element: &ElementInfo) -> u32 {
+    let (nodes, pairs) = (element.nodes as u32, pairs(element.nodes).count() as u32);
+    point_operations(law, "linearize") + 9 * tangent_operations(law) + nodes * (3 + 27 * 5) + pairs * 27 * 2
+}
+
 /// The kernels of a law's damping, each with its operations an element.
 fn damping_kernels(law: &LawEntry, element: &'static ElementInfo) -> impl Iterator<Item = (&'static str, u32)> {
     let (info, linear) = (law.info, law.damping.map(|damping| damping.linear));
@@ -271,6 +295,9 @@ fn law(batch: &LawBatch, tangent: Option<Tangent>, proportional: bool) -> Planne
             kernels.push(("linearize", operations(element, 1, point("linearize"))));
         }
         kernels.push(("apply", operations(element, 1, tangent_operations(info) + element.contract_operations)));
+    }
+    if tangent == Some(Tangent::Assembled) {
+        kernels.push(("assemble", operations(element, 1, assembly_operations(info, element))));
     }
     if tangent == Some(Tangent::Recomputed) || proportional {
         kernels.push(("dforce", operations(element, gathers, point("dforce") + element.contract_operations)));

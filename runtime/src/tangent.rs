@@ -1,12 +1,15 @@
-//! How products with the tangent are computed on a CPU: from what is stored of the state, or from the state anew.
+//! How products with the tangent are computed on a CPU: from what is stored of the state, from the state anew, or by a matrix.
 //!
-//! Both give the same numbers to rounding: on registers a product that is stored is rounded where it would be fused with a
-//! sum. Storing saves operations in every product and costs memory that every product
-//! reads: little while it stays in a cache, more than the operations of a cheap law where it does not.
+//! The first two give the same numbers to rounding: on registers a product that is stored is rounded where it would be fused
+//! with a sum. Storing saves operations in every product and costs memory that every product reads: little while it stays
+//! in a cache, more than the operations of a cheap law where it does not. A matrix takes fewer operations still, and of
+//! simple elements fewer numbers; but it takes several products' time to assemble, and what is rounded in it no longer
+//! knows that a rigid motion costs nothing. In f32 that loses digits where stiffnesses differ, so that it has to be asked for.
 
 use serde::Serialize;
 
 use crate::body::{Body, LawBatch};
+use crate::mesh::Incidence;
 use crate::plan::{point_operations, tangent_operations};
 use crate::scene::{Scene, TangentChoice};
 
@@ -18,6 +21,8 @@ pub enum Tangent {
     Stored,
     /// Everything is computed in each product.
     Recomputed,
+    /// Blocks of 3 x 3 numbers between nodes are assembled once a linearisation.
+    Assembled,
 }
 
 /// Bytes of rest data and stored tangents of a body that a machine's caches are taken to hold.
@@ -31,15 +36,58 @@ const PRICE: u32 = 9;
 pub fn by_rule(body: &Body, real: usize) -> Vec<Tangent> {
     let numbers = |b: &LawBatch| b.elements.len() * b.element.info.points.len() * (10 + b.law.info.stored);
     let in_cache = real * body.batches.iter().map(numbers).sum::<usize>() <= CACHE;
-    let choice = |b: &LawBatch| if in_cache || saves(b) { Tangent::Stored } else { Tangent::Recomputed };
+    let choice = |b: &LawBatch| {
+        let free = if in_cache || saves(b) { Tangent::Stored } else { Tangent::Recomputed };
+        if real == size_of::<f64>() && assembling_saves(body, b, free) { Tangent::Assembled } else { free }
+    };
     body.batches.iter().map(choice).collect()
+}
+
+/// Whether a product with a matrix costs so much less than one without that the matrix is worth assembling: less where that
+/// happens once, half as much where it happens in every iteration of Newton's method.
+fn assembling_saves(body: &Body, batch: &LawBatch, free: Tangent) -> bool {
+    let (law, element) = (batch.law.info, batch.element.info);
+    let points = batch.elements.len() * element.points.len();
+    let (numbers, operations) = match free {
+        Tangent::Stored => (10 + law.stored, element.gradient_operations + tangent_operations(law)),
+        _ => (10, element.gradient_operations + anew(batch)),
+    };
+    let cost = |numbers: usize, operations: usize| PRICE as usize * numbers + operations;
+    let free = points * cost(numbers, (operations + element.contract_operations) as usize);
+    // Each block serves two nodes with 18 operations each.
+    let assembled = blocks(body, batch) * cost(9, 36);
+    if law.structure.linear { assembled < free } else { 2 * assembled < free }
+}
+
+/// Operations of G and dP at a point from the state.
+fn anew(batch: &LawBatch) -> u32 {
+    batch.element.info.gradient_operations + point_operations(batch.law.info, "dforce")
 }
 
 /// Whether storing saves more at a point than reading costs, where it is read from memory.
 fn saves(batch: &LawBatch) -> bool {
-    let (law, element) = (batch.law.info, batch.element.info);
-    let anew = element.gradient_operations + point_operations(law, "dforce");
-    anew.saturating_sub(tangent_operations(law)) >= PRICE * law.stored as u32
+    let law = batch.law.info;
+    anew(batch).saturating_sub(tangent_operations(law)) >= PRICE * law.stored as u32
+}
+
+/// Blocks of the assembled tangent of a batch: one for each node, and one for each two nodes that an element joins.
+pub fn blocks(body: &Body, batch: &LawBatch) -> usize {
+    let nodes = |e: &u32| &body.elements[*e as usize];
+    let slots = batch.elements.iter().flat_map(nodes).map(|n| *n as usize);
+    let incidence = Incidence::of_slots(body.masses.len(), slots);
+    // The last node that met each.
+    let mut met = vec![usize::MAX; body.masses.len()];
+    let mut blocks = 0;
+    for (node, ends) in incidence.offsets().windows(2).enumerate() {
+        for slot in &incidence.slots()[ends[0] as usize..ends[1] as usize] {
+            let element = batch.elements[*slot as usize / batch.element.info.nodes];
+            for other in nodes(&element).iter().map(|n| *n as usize).filter(|other| *other >= node) {
+                blocks += usize::from(met[other] != node);
+                met[other] = node;
+            }
+        }
+    }
+    blocks
 }
 
 /// Who chose how products are computed.
@@ -60,6 +108,7 @@ pub fn asked_for(scene: &Scene, body: &Body) -> (Vec<Tangent>, ChosenBy) {
     match scene.solver.cg.tangent {
         TangentChoice::Stored => all(Tangent::Stored),
         TangentChoice::Recomputed => all(Tangent::Recomputed),
+        TangentChoice::Assembled => all(Tangent::Assembled),
         TangentChoice::Auto | TangentChoice::Measured => {
             (by_rule(body, scene.solver.precision.bytes()), ChosenBy::Rule)
         }

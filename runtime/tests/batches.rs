@@ -151,9 +151,13 @@ fn check(what: &str, one: &Swing, other: &Swing) {
 /// More elements than two tasks take, and more nodes than one block of a sum.
 #[test]
 fn threads_change_nothing() {
-    let cells = [16, 16, 16];
+    let swing = Swing { cells: [16; 3], steps: 2, ..SWING };
     for threads in [2, 3] {
-        check("threads", &Swing { cells, steps: 2, ..SWING }, &Swing { cells, steps: 2, threads, ..SWING });
+        check("threads", &swing, &Swing { threads, ..swing });
+    }
+    for tangent in ["stored", "recomputed", "assembled"] {
+        let swing = Swing { tangent, ..swing };
+        assert_eq!(swing.bits(), Swing { threads: 3, ..swing }.bits(), "{tangent}");
     }
 }
 
@@ -167,7 +171,7 @@ fn tangents_change_nothing_but_rounding() {
             bits.into_iter().map(|(name, bits)| (name, f64::from_bits(bits))).collect::<Vec<_>>()
         };
         let stored = values("stored");
-        for tangent in ["recomputed", "measured"] {
+        for tangent in ["recomputed", "assembled", "measured"] {
             for ((name, value), (_, wanted)) in values(tangent).iter().zip(&stored) {
                 let error = (value / wanted - 1.0).abs();
                 assert!(error <= 1e4 * unit, "{name}, {precision}: {tangent} is off by {error:e}");

@@ -13,6 +13,7 @@ use tensormass_kernels::{ElementEntry, elements, laws};
 use tensormass_runtime::LawEntry;
 use tensormass_runtime::backend::{Backend, ForceField, LeftDomain};
 use tensormass_runtime::cpu::{CpuBackend, CpuField, CpuVector, Engine, Precision};
+use tensormass_runtime::tangent::Tangent;
 
 /// Roundings in a kernel's longest chain of operations, and what they may be magnified by at strains of a third: that of
 /// what cancels in stresses, a few times their size.
@@ -56,9 +57,12 @@ impl Case {
         all.push(("force", kept(&mut out)));
         field.add_dforce_at(&backend, &u, &du, 1.0, &mut out);
         all.push(("dforce", kept(&mut out)));
-        field.prepare(&backend, &u);
-        field.add_dforce(&backend, &du, 1.0, &mut out);
-        all.push(("apply", kept(&mut out)));
+        for (product, tangent) in [("apply", Tangent::Stored), ("assembled", Tangent::Assembled)] {
+            field = field.with_tangents(&[tangent]);
+            field.prepare(&backend, &u);
+            field.add_dforce(&backend, &du, 1.0, &mut out);
+            all.push((product, kept(&mut out)));
+        }
         field.add_diagonal_at(&backend, &u, 1.0, &mut out);
         all.push(("diagonal", kept(&mut out)));
         field.add_damping(&backend, [&u, &v], 1.0, &mut out);
@@ -77,9 +81,9 @@ impl Case {
         let largest = |values: &[f64]| values.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         for engine in Engine::available() {
             let found = self.all::<R>(engine).unwrap_or_else(|e| panic!("{}: {e}", self.name));
-            let of_dforce = found.iter().find(|(kernel, _)| *kernel == "dforce");
-            let applied = found.iter().find(|(kernel, _)| *kernel == "apply");
-            let pairs = of_dforce.into_iter().zip(applied).chain(wanted.iter().zip(&found));
+            let of = |name: &str| found.iter().find(|(kernel, _)| *kernel == name).expect("it is computed");
+            let products = ["apply", "assembled"].map(|product| (of("dforce"), of(product)));
+            let pairs = products.into_iter().chain(wanted.iter().zip(&found));
             for ((kernel, wanted), (_, found)) in pairs {
                 assert_eq!(wanted.len(), found.len());
                 let off = wanted.iter().zip(found).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);

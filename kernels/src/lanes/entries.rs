@@ -5,9 +5,11 @@
 #![allow(unsafe_code)]
 
 use super::{Lanes, Node, chains};
+use crate::assembly::{self, Pair, Tangents};
 use crate::damping::Dissipative;
 use crate::element::{self, Element, ElementKernels, Elements};
 use crate::law::Law;
+use crate::matrix::{self, MultiplyKernel, Rows};
 use crate::point::{self, DampingPointKernels, Material, Outside, PointKernels};
 
 /// Lanes with entries for every law and element.
@@ -20,6 +22,8 @@ pub trait Entries: Lanes {
     fn elements<E: Element>() -> ElementKernels<Self>;
     /// See [`chains::chains`].
     fn chains() -> fn(usize) -> Self::Scalar;
+    /// See [`matrix::multiply`].
+    fn multiply() -> MultiplyKernel<Self>;
 }
 
 macro_rules! entry {
@@ -82,6 +86,11 @@ macro_rules! entries {
                 entry!([$($feature)?], $lanes, chains::chains<>(rounds: usize) -> $scalar)
             }
 
+            fn multiply() -> MultiplyKernel<Self> {
+                entry!([$($feature)?], $lanes, matrix::multiply<>(
+                    rows: &Rows<$scalar>, x: &[Node<$scalar>], y: &mut [Node<$scalar>]))
+            }
+
             fn elements<E: Element>() -> ElementKernels<Self> {
                 ElementKernels {
                     gradient: entry!([$($feature)?], $lanes, element::gradient<E: Element>(
@@ -98,6 +107,9 @@ macro_rules! entries {
                         elements: &Elements<$lanes>, densities: &[$lanes], out: &mut [$lanes])),
                     mean: entry!([$($feature)?], $lanes, element::mean<>(
                         elements: &Elements<$lanes>, tensors: &[[$lanes; 9]], out: &mut [[$lanes; 9]])),
+                    assemble: entry!([$($feature)?], $lanes, assembly::assemble<>(
+                        elements: &Elements<$lanes>, dimension: usize, tangents: &Tangents<$lanes>,
+                        gradients: &[[$lanes; 3]], places: &[u32], out: &mut [Pair<$scalar>])),
                 }
             }
         }

@@ -25,6 +25,26 @@ pub type Node<R> = [R; 4];
 /// A node's place among those of a cluster, in units of eight bytes: the scale of an address.
 pub type Place = u16;
 
+/// A place, or one among more nodes than a cluster has.
+pub trait Index: Copy {
+    /// In the same units.
+    fn index(self) -> usize;
+}
+
+impl Index for Place {
+    #[inline(always)]
+    fn index(self) -> usize {
+        usize::from(self)
+    }
+}
+
+impl Index for u32 {
+    #[inline(always)]
+    fn index(self) -> usize {
+        self as usize
+    }
+}
+
 /// Places from one node to the next.
 pub(crate) const fn stride<R>() -> usize {
     size_of::<Node<R>>() / 8
@@ -53,7 +73,7 @@ pub trait Lanes: Real {
     ///
     /// # Safety
     /// As for [`Lanes::gather`].
-    unsafe fn scatter(vectors: [Self; 3], nodes: &mut [Node<Self::Scalar>], places: &[Place]);
+    unsafe fn scatter<I: Index>(vectors: [Self; 3], nodes: &mut [Node<Self::Scalar>], places: &[I]);
     /// The first lane that is not > 0.
     fn first_not_positive(self) -> usize;
 }

@@ -1,6 +1,6 @@
 //! A single number as lanes: any machine has it.
 
-use super::{Lanes, Node, Place};
+use super::{Index, Lanes, Node, Place};
 
 macro_rules! scalar {
     ($t:ty) => {
@@ -26,8 +26,8 @@ macro_rules! scalar {
                 [x, y, z]
             }
             #[inline(always)]
-            unsafe fn scatter(vector: [$t; 3], nodes: &mut [Node<$t>], places: &[Place]) {
-                let node = &mut nodes[usize::from(places[0]) / super::stride::<$t>()];
+            unsafe fn scatter<I: Index>(vector: [$t; 3], nodes: &mut [Node<$t>], places: &[I]) {
+                let node = &mut nodes[places[0].index() / super::stride::<$t>()];
                 for c in 0..3 {
                     node[c] += vector[c];
                 }

@@ -9,7 +9,7 @@ mod own;
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::{Lanes, Node, Place, functions};
+use super::{Index, Lanes, Node, Place, functions};
 use crate::real::Real;
 use own::{f32x8, f32x16, f64x4, f64x8};
 
@@ -213,8 +213,8 @@ macro_rules! lanes {
                 [Self(x), Self(y), Self(z)]
             }
             #[inline(always)]
-            unsafe fn scatter([x, y, z]: [Self; 3], nodes: &mut [Node<$scalar>], places: &[Place]) {
-                let places: &[Place; $count] = places[..$count].try_into().expect("as many places as lanes");
+            unsafe fn scatter<I: Index>([x, y, z]: [Self; 3], nodes: &mut [Node<$scalar>], places: &[I]) {
+                let places: &[I; $count] = places[..$count].try_into().expect("as many places as lanes");
                 // SAFETY: the value is evidence of the machine; the caller vouches for the places.
                 unsafe { $own::scatter([x.0, y.0, z.0], nodes.as_mut_ptr().cast(), places) }
             }

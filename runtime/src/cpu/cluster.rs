@@ -8,6 +8,7 @@ use std::ops::Range;
 use tensormass_kernels::{Blocks, Cluster as Elements, Compute, Node, RestPoint};
 
 use super::Precision;
+use super::vectors::CpuVector;
 use crate::body::{Body, LawBatch};
 
 /// Elements of one law and kind that are near each other.
@@ -39,14 +40,10 @@ impl Cluster {
         all.dedup();
         let foreign: Vec<u32> = all[..all.partition_point(|n| (*n as usize) < met)].to_vec();
         let own = met..met + all.len() - foreign.len();
-        // Within a cluster its own come first.
-        let local = |n: u32| match (n as usize).checked_sub(met) {
-            Some(own) => own as u32,
-            None => (own.len() + foreign.partition_point(|f| *f < n)) as u32,
-        };
-        let nodes: Vec<u32> = elements.iter().flat_map(nodes).map(local).collect();
+        let cluster = Self { elements, own, foreign };
+        let nodes: Vec<u32> = cluster.elements.iter().flat_map(nodes).map(|n| cluster.local(n)).collect();
         let round = |x: f64| R::from_f64(x);
-        let rest = elements.iter().flat_map(|e| &body.rest[*e as usize]);
+        let rest = cluster.elements.iter().flat_map(|e| &body.rest[*e as usize]);
         let rest: Vec<RestPoint<R>> = rest
             .map(|r| RestPoint { inverse_jacobian: r.inverse_jacobian.map(round), weight: round(r.weight) })
             .collect();
@@ -55,7 +52,23 @@ impl Cluster {
             false => batch.constants.iter().map(|c| round(*c)).collect(),
         };
         blocks.fill(number, &Elements { nodes: &nodes, rest: &rest, constants: &constants });
-        Self { elements, own, foreign }
+        cluster
+    }
+
+    /// The number that a node has within the cluster, of which its own have the first, by its place in the body.
+    pub fn local(&self, place: u32) -> u32 {
+        match (place as usize).checked_sub(self.own.start) {
+            Some(own) => own as u32,
+            None => (self.own.len() + self.foreign.partition_point(|n| *n < place)) as u32,
+        }
+    }
+
+    /// The place of a node in the body.
+    pub fn place(&self, local: u32) -> u32 {
+        match (local as usize).checked_sub(self.own.len()) {
+            Some(foreign) => self.foreign[foreign],
+            None => self.own.start as u32 + local,
+        }
     }
 
     /// Nodes.
@@ -84,6 +97,36 @@ impl Cluster {
                 None => to[3 * n..].copy_from_slice(&from[..3]),
             });
         }
+    }
+}
+
+/// The vectors of a cluster's nodes.
+pub(super) type Vectors<'a, R, const N: usize> = [&'a [Node<R>]; N];
+
+/// Room for vectors at the nodes of any cluster of a batch.
+pub(super) struct Room<R, const N: usize>([Vec<Node<R>>; N]);
+
+impl<R: Precision, const N: usize> Room<R, N> {
+    pub fn new() -> Self {
+        Self(std::array::from_fn(|_| vec![]))
+    }
+
+    /// Vectors of zeros at the nodes of a cluster.
+    pub fn zeros(&mut self, blocks: &Blocks<R>, cluster: &Cluster) -> [&mut [Node<R>]; N] {
+        self.0.each_mut().map(|room| {
+            room.resize(blocks.reach(), [R::default(); 4]);
+            room[..cluster.nodes()].fill([R::default(); 4]);
+            room.as_mut_slice()
+        })
+    }
+
+    /// Copies of vectors at the nodes of a cluster.
+    pub fn copies(&mut self, blocks: &Blocks<R>, cluster: &Cluster, vectors: [&CpuVector<R>; N]) -> Vectors<'_, R, N> {
+        for (room, vector) in self.0.iter_mut().zip(vectors) {
+            room.resize(blocks.reach(), [R::default(); 4]);
+            cluster.copy(&vector.0, &mut room[..cluster.nodes()]);
+        }
+        self.0.each_ref().map(Vec::as_slice)
     }
 }
 

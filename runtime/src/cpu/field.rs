@@ -9,9 +9,10 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
-use tensormass_kernels::{Blocks, Compute, Engine, Node, Part, States, compose};
+use tensormass_kernels::{Blocks, Compute, Engine, LawInfo, Node, Part, States, compose};
 
-use super::cluster::Cluster;
+use super::assembled::Assembled;
+use super::cluster::{Cluster, Room, Vectors};
 use super::vectors::{BLOCK, CpuVector, exact_dot};
 use super::{CpuBackend, Precision};
 use crate::backend::{Backend, ForceField, LeftDomain, Operator, REGISTERS, RUNNING, SUM};
@@ -22,15 +23,29 @@ use crate::tangent::{self, Tangent};
 
 /// The elements of one law and kind.
 struct CpuBatch<R: Precision> {
-    law: &'static str,
-    domain: &'static str,
+    law: &'static LawInfo,
     compute: Box<dyn Compute<R>>,
     clusters: Vec<Cluster>,
     blocks: Blocks<R>,
-    /// How products with the tangent are computed.
-    tangent: Tangent,
-    /// What they need of a state, where it is stored; none before they are asked for.
-    states: Option<States<R>>,
+    /// Products with the tangent.
+    products: Products<R>,
+}
+
+/// How products with the tangent are computed, with what they need of a state; none before they are asked for.
+enum Products<R> {
+    Stored(Option<States<R>>),
+    Recomputed,
+    Assembled(Option<Assembled<R>>),
+}
+
+impl<R> From<Tangent> for Products<R> {
+    fn from(tangent: Tangent) -> Self {
+        match tangent {
+            Tangent::Stored => Self::Stored(None),
+            Tangent::Recomputed => Self::Recomputed,
+            Tangent::Assembled => Self::Assembled(None),
+        }
+    }
 }
 
 impl<R: Precision> CpuBatch<R> {
@@ -49,48 +64,30 @@ impl<R: Precision> CpuBatch<R> {
             cluster
         };
         Self {
-            law: batch.law.info.name,
-            domain: batch.law.info.domain.unwrap_or("everywhere"),
+            law: batch.law.info,
             clusters: ranges.into_iter().enumerate().map(cluster).collect(),
             blocks,
             compute,
-            tangent: Tangent::Stored,
-            states: None,
+            products: Products::Stored(None),
         }
+    }
+
+    /// What a cluster adds to a product from what is stored of the state.
+    fn multiply(&self, cluster: usize, du: &[Node<R>], out: &mut [Node<R>]) -> Option<usize> {
+        match &self.products {
+            Products::Stored(Some(states)) => {
+                let part = self.blocks.part(cluster);
+                self.compute.apply(part, states.of(part), du, out);
+            }
+            Products::Assembled(Some(matrix)) => matrix.multiply(&*self.compute, cluster, du, out),
+            _ => unreachable!("the tangent is linearized"),
+        }
+        None
     }
 
     fn left(&self, element: u32) -> LeftDomain {
-        LeftDomain { element, law: self.law.to_string(), domain: self.domain.to_string() }
-    }
-}
-
-/// The vectors of a cluster's nodes.
-type Vectors<'a, R, const N: usize> = [&'a [Node<R>]; N];
-
-/// Room for vectors at the nodes of any cluster of a batch.
-struct Room<R, const N: usize>([Vec<Node<R>>; N]);
-
-impl<R: Precision, const N: usize> Room<R, N> {
-    fn new() -> Self {
-        Self(std::array::from_fn(|_| vec![]))
-    }
-
-    /// Vectors of zeros at the nodes of a cluster.
-    fn zeros(&mut self, blocks: &Blocks<R>, cluster: &Cluster) -> [&mut [Node<R>]; N] {
-        self.0.each_mut().map(|room| {
-            room.resize(blocks.reach(), [R::default(); 4]);
-            room[..cluster.nodes()].fill([R::default(); 4]);
-            room.as_mut_slice()
-        })
-    }
-
-    /// Copies of vectors at the nodes of a cluster.
-    fn copies(&mut self, blocks: &Blocks<R>, cluster: &Cluster, vectors: [&CpuVector<R>; N]) -> Vectors<'_, R, N> {
-        for (room, vector) in self.0.iter_mut().zip(vectors) {
-            room.resize(blocks.reach(), [R::default(); 4]);
-            cluster.copy(&vector.0, &mut room[..cluster.nodes()]);
-        }
-        self.0.each_ref().map(Vec::as_slice)
+        let (law, domain) = (self.law.name.to_string(), self.law.domain.unwrap_or("everywhere").to_string());
+        LeftDomain { element, law, domain }
     }
 }
 
@@ -144,9 +141,7 @@ impl<R: Precision> CpuField<R> {
 
     /// Computes products with the tangent of each law in this way, instead of by the rule.
     pub fn with_tangents(mut self, tangents: &[Tangent]) -> Self {
-        for (batch, tangent) in self.batches.iter_mut().zip(tangents) {
-            (batch.tangent, batch.states) = (*tangent, None);
-        }
+        self.batches.iter_mut().zip(tangents).for_each(|(batch, tangent)| batch.products = (*tangent).into());
         self.is_linearized = false;
         self
     }
@@ -157,13 +152,13 @@ impl<R: Precision> CpuField<R> {
         vectors: [&CpuVector<R>; N],
         kernel: impl Fn(&dyn Compute<R>, Part<R>, Vectors<R, N>, &mut [Node<R>]) -> Option<usize> + Sync,
     ) -> Result<(), LeftDomain> {
-        self.pass(vectors, |batch, part, vectors, out| kernel(&*batch.compute, part, vectors, out))
+        self.pass(vectors, |batch, k, vectors, out| kernel(&*batch.compute, batch.blocks.part(k), vectors, out))
     }
 
     fn pass<const N: usize>(
         &mut self,
         vectors: [&CpuVector<R>; N],
-        kernel: impl Fn(&CpuBatch<R>, Part<R>, Vectors<R, N>, &mut [Node<R>]) -> Option<usize> + Sync,
+        kernel: impl Fn(&CpuBatch<R>, usize, Vectors<R, N>, &mut [Node<R>]) -> Option<usize> + Sync,
     ) -> Result<(), LeftDomain> {
         let (mut own, mut foreign) = (self.own.as_mut_slice(), self.foreign.as_mut_slice());
         let mut tasks = vec![];
@@ -183,7 +178,7 @@ impl<R: Precision> CpuField<R> {
                     let (blocks, cluster) = (&batch.blocks, &batch.clusters[k]);
                     let vectors = room.copies(blocks, cluster, vectors);
                     let [out] = out.zeros(blocks, cluster);
-                    let outside = kernel(batch, blocks.part(k), vectors, out);
+                    let outside = kernel(batch, k, vectors, out);
                     cluster.leave(out, own, foreign);
                     outside.map(|e| (cluster.elements[e], batch))
                 },
@@ -209,13 +204,28 @@ impl<R: Precision> CpuField<R> {
     /// Stores what products with the tangent need of the state.
     fn linearize(&mut self) {
         let u = &self.state;
-        for batch in self.batches.iter_mut().filter(|b| b.tangent == Tangent::Stored) {
-            let (compute, blocks, clusters) = (&*batch.compute, &batch.blocks, &batch.clusters);
-            let states = batch.states.get_or_insert_with(|| compute.states(blocks));
-            states.parts_mut(blocks).into_par_iter().enumerate().for_each_init(Room::new, |room, (k, states)| {
-                let [u] = room.copies(blocks, &clusters[k], [u]);
-                compute.linearize(blocks.part(k), u, states);
-            });
+        for CpuBatch { law, compute, clusters, blocks, products, .. } in &mut self.batches {
+            let (compute, clusters, blocks) = (&**compute, &*clusters, &*blocks);
+            match products {
+                Products::Stored(states) => {
+                    let states = states.get_or_insert_with(|| compute.states(blocks));
+                    states.parts_mut(blocks).into_par_iter().enumerate().for_each_init(
+                        Room::new,
+                        |room, (k, states)| {
+                            let [u] = room.copies(blocks, &clusters[k], [u]);
+                            compute.linearize(blocks.part(k), u, states);
+                        },
+                    );
+                }
+                Products::Recomputed => {}
+                Products::Assembled(matrix) => {
+                    let matrix = matrix.get_or_insert_with(|| Assembled::new(clusters, blocks, compute.lanes()));
+                    // The tangent of a linear law is the same everywhere.
+                    if !(law.structure.linear && matrix.is_filled) {
+                        matrix.fill(compute, blocks, clusters, u);
+                    }
+                }
+            }
         }
         self.is_linearized = true;
     }
@@ -225,25 +235,19 @@ impl<R: Precision> CpuField<R> {
         if !self.is_linearized {
             self.linearize();
         }
-        fn stored<R: Precision>(batch: &CpuBatch<R>, part: Part<R>, du: &[Node<R>], out: &mut [Node<R>]) {
-            let states = batch.states.as_ref().expect("the tangent is linearized");
-            batch.compute.apply(part, states.of(part), du, out);
-        }
-        let done = if self.batches.iter().all(|b| b.tangent == Tangent::Stored) {
-            self.pass([du], |batch, part, [du], out| {
-                stored(batch, part, du, out);
-                None
-            })
-        } else {
+        let recomputes = self.batches.iter().any(|b| matches!(b.products, Products::Recomputed));
+        let done = if recomputes {
             self.at_state(|field, u| {
-                field.pass([u, du], |batch, part, [u, du], out| {
-                    match batch.tangent {
-                        Tangent::Stored => stored(batch, part, du, out),
-                        Tangent::Recomputed => batch.compute.dforce(part, [u, du], out),
+                field.pass([u, du], |batch, k, [u, du], out| match batch.products {
+                    Products::Recomputed => {
+                        batch.compute.dforce(batch.blocks.part(k), [u, du], out);
+                        None
                     }
-                    None
+                    _ => batch.multiply(k, du, out),
                 })
             })
+        } else {
+            self.pass([du], |batch, k, [du], out| batch.multiply(k, du, out))
         };
         debug_assert!(done.is_ok(), "differentials report no domain");
     }

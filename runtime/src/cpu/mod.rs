@@ -1,5 +1,6 @@
 //! The CPU backend: vectors in memory, sums in fixed blocks, clusters of elements on all cores.
 
+mod assembled;
 mod cluster;
 mod field;
 mod one;

@@ -7,7 +7,7 @@ use crate::backend::{ALPHA, Advance, BETA, Backend, Counts, Descent, REGISTERS, 
 use crate::body::{Body, Constraint};
 use crate::device::DeviceError;
 use crate::mass::MassMatrix;
-use crate::order::node_places;
+use crate::order::{node_places, placed_constraints};
 
 /// Nodes a block: a block's partial sum is formed by one thread, blocks are added in order.
 pub(super) const BLOCK: usize = 1024;
@@ -53,9 +53,7 @@ impl<R: Precision> CpuBackend<R> {
     /// A backend for a body.
     pub fn new(body: &Body) -> Self {
         let places = node_places(body);
-        let place = |c: &Constraint| Constraint { node: places[c.node as usize], ..*c };
-        let mut constraints: Vec<Constraint> = body.constraints.iter().map(place).collect();
-        constraints.sort_unstable_by_key(|c| (c.node, c.component));
+        let constraints = placed_constraints(body, &places);
         Self { places, constraints, precision: std::marker::PhantomData }
     }
 
@@ -134,17 +132,8 @@ impl<R: Precision> Backend for CpuBackend<R> {
     }
 
     fn matrix(&self, matrix: &MassMatrix) -> CpuMatrix<R> {
-        let mut node_at = vec![0; self.places.len()];
-        self.places.iter().enumerate().for_each(|(node, place)| node_at[*place as usize] = node);
-        let mut rows = CpuMatrix { offsets: vec![0], columns: vec![], values: vec![] };
-        for node in node_at {
-            let row = matrix.row(node);
-            rows.columns.extend(matrix.columns[row.clone()].iter().map(|n| self.places[*n as usize]));
-            rows.values.extend(matrix.values[row].iter().map(|value| R::from_f64(*value)));
-            // `as u32` is exact: there are as many entries as in the matrix.
-            rows.offsets.push(rows.columns.len() as u32);
-        }
-        rows
+        let MassMatrix { offsets, columns, values } = matrix.placed(&self.places);
+        CpuMatrix { offsets, columns, values: values.into_iter().map(R::from_f64).collect() }
     }
 
     fn add_product(&self, a: f64, matrix: &CpuMatrix<R>, x: &Self::Vector, y: &mut Self::Vector) {

@@ -21,7 +21,7 @@ fn parameter(p: &ParameterInfo, stiffer: f64) -> String {
 
 /// A scene of a body of one law.
 pub fn scene_text(subject: &Subject) -> String {
-    let Subject { law, element, body, precision, stiffness_ratio, .. } = subject;
+    let Subject { law, element, body, precision, stiffness_ratio, tangent, .. } = subject;
     let mesh = match body {
         Body::Beam(cells) => {
             format!("beam = {{ size = [5, 1, 1], cells = {cells:?}, element = \"{}\" }}", element.info.name)
@@ -44,8 +44,9 @@ pub fn scene_text(subject: &Subject) -> String {
     };
     format!(
         "[mesh]\n{mesh}\n{materials}[solver]\nintegrator = \"implicit-euler\"\nprecision = \"{}\"\nstep = 1e-5\n\
-         duration = 1e-5\n",
-        precision_name(*precision)
+         duration = 1e-5\n[solver.cg]\ntangent = \"{}\"\n",
+        precision_name(*precision),
+        tangent.name()
     )
 }
 

@@ -22,6 +22,7 @@ use crate::model::{BuildError, Model, build};
 use crate::order::sharing;
 use crate::scene::{self, SceneError};
 use crate::system::SolveError;
+use crate::tangent::{Tangent, asked_for, blocks};
 use crate::target::Target;
 
 pub use body::{cells, scene_text, wave};
@@ -55,6 +56,8 @@ pub struct Subject {
     pub repeats: usize,
     /// How many times stiffer the material is in one half of a beam than in the other.
     pub stiffness_ratio: f64,
+    /// How products with the tangent are computed on a CPU.
+    pub tangent: scene::TangentChoice,
 }
 
 /// Why nothing was measured.
@@ -243,16 +246,17 @@ impl Measurement for Step {
 
 /// Measures a subject on a device.
 fn on<M: Measurement>(target: &Target, subject: &Subject, measurement: M) -> Result<M::Result, MeasureError> {
-    let text = scene_text(subject);
-    let model = build(&scene::parse(&text, "bench.toml", &[])?)?;
+    let scene = scene::parse(&scene_text(subject), "bench.toml", &[])?;
+    let model = build(&scene)?;
+    let (tangents, _) = asked_for(&scene, &model.body);
     let other = model.body.batches.iter().find(|batch| batch.element.info.name != subject.element.info.name);
     if let (Body::File(file), Some(other)) = (&subject.body, other) {
         let (found, wanted) = (other.element.info.name, subject.element.info.name);
         return Err(MeasureError::Kind { file: file.display().to_string(), found, wanted });
     }
     match (target, subject.precision) {
-        (Target::Cpu, scene::Precision::F32) => on_cpu::<f32, M>(subject, model, measurement),
-        (Target::Cpu, scene::Precision::F64) => on_cpu::<f64, M>(subject, model, measurement),
+        (Target::Cpu, scene::Precision::F32) => on_cpu::<f32, M>(subject, model, &tangents, measurement),
+        (Target::Cpu, scene::Precision::F64) => on_cpu::<f64, M>(subject, model, &tangents, measurement),
         #[cfg(feature = "gpu")]
         (Target::Gpu(gpu, options), scene::Precision::F32) => {
             let backend = GpuBackend::new(std::sync::Arc::clone(gpu), &model.body, *options)?;
@@ -271,13 +275,17 @@ fn on<M: Measurement>(target: &Target, subject: &Subject, measurement: M) -> Res
 fn on_cpu<R: Precision, M: Measurement>(
     subject: &Subject,
     model: Model,
+    tangents: &[Tangent],
     measurement: M,
 ) -> Result<M::Result, MeasureError> {
     let backend = CpuBackend::<R>::new(&model.body);
-    let field = CpuField::<R>::new(&backend, &model.body);
+    let field = CpuField::<R>::new(&backend, &model.body).with_tangents(tangents);
     let real = size_of::<R>() as f64;
     let slots = sharing(&model.body).foreign as f64 / model.body.elements.len() as f64;
     let sizes = Layout { real, vector: 3.0 * real, slot: 3.0 * real, point: 10.0 * real, ..Layout::default() };
-    let layout = Layout { place: 2.0, slots, local: 4.0, own: 3.0 * real, ..sizes };
+    let blocks: usize = model.body.batches.iter().map(|batch| blocks(&model.body, batch)).sum();
+    let blocks = blocks as f64 / model.body.elements.len() as f64;
+    let tangent = tangents[0];
+    let layout = Layout { place: 2.0, slots, local: 4.0, own: 3.0 * real, tangent, blocks, ..sizes };
     measurement.on(subject, model, backend, field, layout)
 }

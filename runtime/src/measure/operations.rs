@@ -10,9 +10,7 @@ use crate::body::Body;
 use crate::cg::{CgLimits, ConjugateGradient};
 use crate::integrate::SemiImplicitEuler;
 use crate::model::Model;
-use crate::plan::{operations, tangent_operations};
 use crate::system::{Integrator, System};
-use crate::tangent::{Tangent, by_rule};
 
 /// Times an operation, after one that is not counted; it waits until it is done, and says what its time is to be multiplied
 /// by.
@@ -46,7 +44,6 @@ pub(super) fn all<B: Backend, F: ForceField<B>>(
     let count = Count { subject, layout, nodes: nodes as f64 / elements as f64 };
     let [u, du] = displacements(subject, &model).map(|u| backend.upload(&u));
     let mut f = backend.zeros();
-    let on_cpu = layout.local > 0.0;
     let repeats = subject.repeats.max(1);
     let linear = subject.law.info.structure.linear;
     let (vectors, per_node) = (if linear { 1 } else { 2 }, subject.element.info.nodes as u32);
@@ -76,25 +73,16 @@ pub(super) fn all<B: Backend, F: ForceField<B>>(
         field.add_diagonal(&backend, 1.0, &mut f);
         done(&backend)
     })?;
-    // What the rule takes, as the field does.
-    let stores = on_cpu && by_rule(&model.body, layout.real as usize).contains(&Tangent::Stored);
-    let stored = if stores { subject.law.info.stored } else { 0 };
+    let stored = subject.law.info.stored;
     let counted = |timing, flops, bytes| Timing { flops: Some(flops), bytes: Some(bytes), ..timing };
-    let (contract, apply_flops) = (subject.element.info.contract_operations, tangent_operations(subject.law.info));
-    let of_apply = match stores {
-        true => operations(subject.element.info, 1, apply_flops + contract),
-        false => count.flops(vectors, "dforce", 1, true),
-    };
-    // Who stores nothing copies the state, and has to read it again.
-    let applied = if stores { 1 } else { vectors };
-    let written = count.layout.real * (stored * subject.element.info.points.len()) as f64;
-    let of_linearize = if stored > 0 { count.flops(1, "linearize", 1, false) } else { 0 };
+    let (apply_flops, apply_bytes) = count.product(vectors, stored);
+    let (linearize_flops, linearize_bytes) = count.linearize(stored);
     let mut timings = vec![
         counted(energy, count.flops(1, "energy", 1, false), count.read(1, 0) + count.layout.real),
         counted(force, count.flops(1, "force", 1, true), count.two_passes(1, 0)),
         counted(dforce, count.flops(vectors, "dforce", 1, true), count.two_passes(vectors, 0)),
-        counted(linearize, of_linearize, count.read(1, 0) + written),
-        counted(apply, of_apply, count.two_passes(applied, stored)),
+        Timing { flops: linearize_flops, bytes: linearize_bytes, ..linearize },
+        counted(apply, apply_flops, apply_bytes),
         counted(diagonal, count.flops(vectors - 1, "diagonal", per_node, false), count.two_passes(vectors - 1, 0)),
     ];
     let mut system = System::new(backend, field, model.body);

@@ -529,8 +529,26 @@ pub enum TangentChoice {
     Stored,
     /// Everything is computed in each product.
     Recomputed,
+    /// A matrix is assembled once an iteration of Newton's method. In f32 that loses digits where stiffnesses differ.
+    Assembled,
     /// As is faster: measured before the first step. Two runs may then differ in their last digits.
     Measured,
+}
+
+impl TangentChoice {
+    /// All choices.
+    pub const ALL: [Self; 5] = [Self::Auto, Self::Stored, Self::Recomputed, Self::Assembled, Self::Measured];
+
+    /// Its name in scenes.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Stored => "stored",
+            Self::Recomputed => "recomputed",
+            Self::Assembled => "assembled",
+            Self::Measured => "measured",
+        }
+    }
 }
 
 /// The nonlinear solver: Newton's method.

@@ -19,6 +19,7 @@ use crate::plan::Layout;
 use crate::scene::{self, Scene};
 use crate::step_limit::StepLimits;
 use crate::system::SolveError;
+use crate::tangent::Tangent;
 use crate::target::Target;
 
 use run::Run;
@@ -151,6 +152,16 @@ fn on_cpu<R: Precision>(
     let field = CpuField::<R>::new(&backend, body);
     let (field, tangents, by) = setup::with_tangents(scene, body, &backend, field);
     let mut run = Run::new(scene, model, backend, field, Layout::Cpu);
+    if scene.solver.precision == scene::Precision::F32
+        && tangents.contains(&Tangent::Assembled)
+        && !scene.solver.integrator.is_explicit()
+    {
+        run.warnings.push(
+            "solver.cg.tangent = \"assembled\" in f32 loses digits where stiffnesses differ: take solver.precision = \"f64\", or \
+             another tangent"
+                .to_owned(),
+        );
+    }
     run.tangents = Some((tangents, by));
     run.all(out, observer)
 }

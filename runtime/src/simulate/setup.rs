@@ -74,8 +74,12 @@ pub(super) fn with_tangents<R: Precision>(
     if scene.solver.integrator.is_explicit() || scene.solver.cg.tangent != scene::TangentChoice::Measured {
         return (field.with_tangents(&tangents), tangents, by);
     }
-    let others = [Tangent::Stored, Tangent::Recomputed].map(|tangent| vec![tangent; body.batches.len()]);
-    let others = others.into_iter().filter(|other| *other != tangents);
+    // What is asked for is speed: digits are not given up for it.
+    let exact = scene.solver.precision == scene::Precision::F64;
+    let all = [Tangent::Stored, Tangent::Recomputed, Tangent::Assembled]
+        .into_iter()
+        .filter(|t| exact || *t != Tangent::Assembled);
+    let others = all.map(|tangent| vec![tangent; body.batches.len()]).filter(|other| *other != tangents);
     let mut candidates: Vec<_> = std::iter::once(tangents.clone()).chain(others).collect();
     let (field, fastest) = fastest(backend, field, &candidates);
     (field, candidates.swap_remove(fastest), ChosenBy::Measurement)

@@ -4,7 +4,7 @@
 
 use std::arch::x86_64::*;
 
-use crate::lanes::Place;
+use crate::lanes::{Index, Place};
 
 pub(super) mod f32x16 {
     use super::*;
@@ -77,7 +77,7 @@ pub(super) mod f32x16 {
     }
 
     #[inline(always)]
-    pub(in crate::lanes) unsafe fn scatter([x, y, z]: [__m512; 3], nodes: *mut u64, places: &[Place; COUNT]) {
+    pub(in crate::lanes) unsafe fn scatter<I: Index>([x, y, z]: [__m512; 3], nodes: *mut u64, places: &[I; COUNT]) {
         unsafe {
             let rows = transpose([x, y, z, _mm512_setzero_ps()]);
             let rows = [whole_ps(rows[0]), whole_ps(rows[1]), whole_ps(rows[2]), whole_ps(rows[3])];
@@ -168,7 +168,7 @@ pub(super) mod f64x8 {
     }
 
     #[inline(always)]
-    pub(in crate::lanes) unsafe fn scatter([x, y, z]: [__m512d; 3], nodes: *mut u64, places: &[Place; COUNT]) {
+    pub(in crate::lanes) unsafe fn scatter<I: Index>([x, y, z]: [__m512d; 3], nodes: *mut u64, places: &[I; COUNT]) {
         unsafe {
             let rows = transpose([x, y, z, _mm512_setzero_pd()]);
             let rows = [whole_pd(rows[0]), whole_pd(rows[1]), whole_pd(rows[2]), whole_pd(rows[3])];
@@ -256,7 +256,7 @@ pub(super) mod f32x8 {
     }
 
     #[inline(always)]
-    pub(in crate::lanes) unsafe fn scatter([x, y, z]: [__m256; 3], nodes: *mut u64, places: &[Place; COUNT]) {
+    pub(in crate::lanes) unsafe fn scatter<I: Index>([x, y, z]: [__m256; 3], nodes: *mut u64, places: &[I; COUNT]) {
         unsafe {
             let rows = transpose([x, y, z, _mm256_setzero_ps()]);
             for k in 0..4 {
@@ -344,7 +344,7 @@ pub(super) mod f64x4 {
     }
 
     #[inline(always)]
-    pub(in crate::lanes) unsafe fn scatter([x, y, z]: [__m256d; 3], nodes: *mut u64, places: &[Place; COUNT]) {
+    pub(in crate::lanes) unsafe fn scatter<I: Index>([x, y, z]: [__m256d; 3], nodes: *mut u64, places: &[I; COUNT]) {
         unsafe {
             let rows = transpose([x, y, z, _mm256_setzero_pd()]);
             for k in 0..4 {
@@ -361,8 +361,8 @@ unsafe fn at<T>(nodes: *const u64, place: Place) -> *const T {
 }
 
 #[inline(always)]
-unsafe fn at_mut<T>(nodes: *mut u64, place: Place) -> *mut T {
-    unsafe { nodes.add(usize::from(place)).cast() }
+unsafe fn at_mut<T>(nodes: *mut u64, place: impl Index) -> *mut T {
+    unsafe { nodes.add(place.index()).cast() }
 }
 
 /// A register that the compiler takes as it is: it would transpose each quarter of four on its own, twice the work.
