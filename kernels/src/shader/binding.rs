@@ -7,7 +7,7 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Binding {
     /// `uniform`, 16 bytes: elements of the pass (`u32`), whether it keeps margins while elements are inside (`u32`), the
-    /// rest unused.
+    /// first slot of its first element (`u32`), the rest unused.
     ElementPass,
     /// `uniform`, 16 bytes: nodes (`u32`), whether the pass is the first to write its product (`u32`), the factor of the
     /// sum of slots (`f32`), the factor of the masses (`f32`).
@@ -26,12 +26,10 @@ pub enum Binding {
     Velocity,
     /// Vector: the direction of a differential.
     Increment,
-    /// `array<vec4<f32>>`: partial forces; the slots of one node follow each other.
+    /// `array<vec4<f32>>`: partial forces, those of an element's nodes one after the other.
     Slots,
-    /// `array<vec4<u32>>`: the slot of each of an element's nodes, in the layout of [`Binding::Nodes`].
-    SlotIndex,
-    /// `array<u32>`: where each node's slots begin, and one end.
-    Offsets,
+    /// `array<u32>`: where in this array the list of each node's slots begins, and where the last one ends; then the lists.
+    Incidence,
     /// `array<f32>`: the least margin of each element's points, positive inside the law's domain.
     Margins,
     /// `array<f32>`: the strain energy of each element.
@@ -77,8 +75,7 @@ impl Binding {
             Self::Velocity => (READ, "velocity", "array<vec4<f32>>"),
             Self::Increment => (READ, "increment", "array<vec4<f32>>"),
             Self::Slots => (WRITTEN, "slots", "array<vec4<f32>>"),
-            Self::SlotIndex => (READ, "slot_index", "array<vec4<u32>>"),
-            Self::Offsets => (READ, "offsets", "array<u32>"),
+            Self::Incidence => (READ, "incidence", "array<u32>"),
             Self::Margins => (WRITTEN, "margins", "array<f32>"),
             Self::Energies => (WRITTEN, "energies", "array<f32>"),
             Self::Stresses => (WRITTEN, "stresses", "array<f32>"),
@@ -97,8 +94,9 @@ struct ElementPass {
     elements: u32,
     // 1 where margins that an earlier pass wrote stay while an element is inside.
     keeps_margins: u32,
-    unused_0: u32,
-    unused_1: u32,
+    // The first slot of the first element.
+    first_slot: u32,
+    unused: u32,
 }
 
 ";

@@ -44,9 +44,6 @@ pub const PASSES: [Pass; 8] = [
     Pass::DampingDiagonal,
 ];
 
-/// Storage buffers that WebGPU's default limits allow a pass.
-const MOST_BUFFERS: usize = 8;
-
 /// The arguments that are gradients of nodal vectors: their names in a pass, the function that reads the nodes, and where.
 const GATHERED: [(Argument, &str, &str, &str); 3] = [
     (Argument::DisplacementGradient, "g", "nodal_displacement", "displacement"),
@@ -150,19 +147,12 @@ impl Composed<'_> {
             (self.reads(Argument::GradientRate), Binding::Velocity),
             (self.reads(Argument::GradientIncrement), Binding::Increment),
             (self.slots(), Binding::Slots),
-            (self.slots(), Binding::SlotIndex),
             (self.margin(), Binding::Margins),
             (self.pass == Pass::Energy, Binding::Energies),
             (self.pass == Pass::Cauchy, Binding::Stresses),
-            (self.pass == Pass::DForce, Binding::Gate),
+            (matches!(self.pass, Pass::DForce | Pass::DDamping), Binding::Gate),
         ];
-        let mut bindings: Vec<Binding> =
-            all.into_iter().filter_map(|(needed, binding)| needed.then_some(binding)).collect();
-        // Where there is no room for the gate the pass runs in vain once a solver has stopped: nobody reads its slots.
-        if self.pass == Pass::DDamping && bindings.len() <= MOST_BUFFERS {
-            bindings.push(Binding::Gate);
-        }
-        bindings
+        all.into_iter().filter_map(|(needed, binding)| needed.then_some(binding)).collect()
     }
 
     fn module(&self, bindings: &[Binding]) -> String {
@@ -369,10 +359,10 @@ impl Composed<'_> {
                 }
             }
             _ => {
-                self.read_fours("slot", "slot_index", out);
+                out.line(&format!("let slot = element_pass.first_slot + {}u * e;", self.info.nodes));
                 for j in 0..self.info.nodes {
                     let [x, y, z] = [3 * j, 3 * j + 1, 3 * j + 2];
-                    let place = Self::place("slot", j);
+                    let place = if j == 0 { "slot".to_string() } else { format!("slot + {j}u") };
                     out.line(&format!("slots[{place}] = vec4<f32>(f[{x}], f[{y}], f[{z}], 0.0f);"));
                 }
             }

@@ -11,7 +11,7 @@ fn shader(what: &str, bindings: &[Binding], body: &str) -> Shader {
 
 /// Adds to each node's vector the sum of its slots.
 pub fn node_sum() -> Shader {
-    let bindings = [Binding::NodePass, Binding::Slots, Binding::Offsets, Binding::Sum];
+    let bindings = [Binding::NodePass, Binding::Slots, Binding::Incidence, Binding::Sum];
     shader("// Adds to each node's vector a multiple of the sum of its slots.\n", &bindings, NODE_SUM)
 }
 
@@ -20,7 +20,7 @@ pub fn node_product() -> Shader {
     let bindings = [
         Binding::NodePass,
         Binding::Slots,
-        Binding::Offsets,
+        Binding::Incidence,
         Binding::Increment,
         Binding::Masses,
         Binding::Product,
@@ -38,9 +38,9 @@ const SUM_OF_SLOTS: &str = "
 // In the order of the slots, whatever the device.
 fn sum_of_slots(i: u32) -> vec3<f32> {
     var s = vec3<f32>(0.0f, 0.0f, 0.0f);
-    let end = offsets[i + 1u];
-    for (var k = offsets[i]; k < end; k++) {
-        s += slots[k].xyz;
+    let end = incidence[i + 1u];
+    for (var k = incidence[i]; k < end; k++) {
+        s += slots[incidence[k]].xyz;
     }
     return s;
 }

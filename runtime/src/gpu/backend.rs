@@ -11,6 +11,7 @@ use crate::backend::{Backend, Counts, Descent, REGISTERS, RUNNING, Update};
 use crate::body::{Body, Constraint};
 use crate::device::DeviceError;
 use crate::mass::MassMatrix;
+use crate::order::{DeviceOrder, placed_constraints};
 
 use super::device::Gpu;
 use super::recorder::{Kernel, Memory, Numbers, Recorder};
@@ -62,7 +63,7 @@ impl GpuOptions {
     }
 }
 
-/// A vector over nodes on the device: four f32 a node, the fourth the node's constraint mask.
+/// A vector over nodes on the device, in the backend's order: four f32 a node, the fourth the node's constraint mask.
 #[derive(Debug)]
 pub struct GpuVector {
     memory: Rc<Memory>,
@@ -105,7 +106,8 @@ impl GpuRegisters {
 pub struct GpuBackend {
     recorder: Rc<Recorder>,
     options: GpuOptions,
-    nodes: usize,
+    /// How elements are ordered, and where each node of the body is in a vector.
+    order: DeviceOrder,
     /// The zero vector, with the constraint masks.
     origin: Memory,
     masks: Vec<f32>,
@@ -130,12 +132,13 @@ impl GpuBackend {
     pub fn new(gpu: Arc<Gpu>, body: &Body, options: GpuOptions) -> Result<Self, DeviceError> {
         let options = options.valid();
         let recorder = Rc::new(Recorder::new(gpu, body.motions.len()));
-        let nodes = body.masses.len();
+        let order = DeviceOrder::of(body);
+        let places = &order.places;
         // [`Backend::matrix`] cannot refuse it.
         let entries = body.mass_matrix.as_ref().map_or(0, |matrix| 4 * matrix.values.len() as u64);
         recorder.fits("the consistent mass", entries)?;
-        let (origin, constrained) = constrained(nodes, &body.constraints);
-        let largest = nodes.max(body.elements.len());
+        let (origin, constrained) = constrained(places.len(), &placed_constraints(body, places));
+        let largest = places.len().max(body.elements.len());
         // One partial sum a group; two dimensions of groups may make a few more.
         let smallest = options.work_group_size.min(GROUP) as usize;
         let partials = largest.div_ceil(smallest) + (1 << 16) + body.batches.len();
@@ -149,7 +152,7 @@ impl GpuBackend {
             gate: Rc::new(recorder.filled("a gate", &open_gate())?),
             recorder,
             options,
-            nodes,
+            order,
             pending: Cell::new(0),
             unused: Rc::default(),
             operations: RefCell::default(),
@@ -168,7 +171,12 @@ impl GpuBackend {
     }
 
     pub(super) fn nodes(&self) -> usize {
-        self.nodes
+        self.order.places.len()
+    }
+
+    /// How the body's elements and nodes are ordered.
+    pub(super) fn order(&self) -> &DeviceOrder {
+        &self.order
     }
 
     pub(super) fn partials(&self) -> &Memory {
@@ -183,7 +191,8 @@ impl GpuBackend {
     fn vector(&self) -> GpuVector {
         let kept = self.unused.borrow_mut().pop();
         // A vector as large as `origin`, which the device could bind.
-        let made = || self.recorder.memory("a vector", 16 * self.nodes as u64).expect("as large as one that was made");
+        let made =
+            || self.recorder.memory("a vector", 16 * self.nodes() as u64).expect("as large as one that was made");
         GpuVector { memory: kept.unwrap_or_else(|| Rc::new(made())), unused: Rc::clone(&self.unused) }
     }
 
@@ -212,7 +221,7 @@ impl GpuBackend {
     }
 
     fn numbers(&self, a: f64) -> Numbers {
-        [self.nodes as u32, 0, (a as f32).to_bits(), 0]
+        [self.nodes() as u32, 0, (a as f32).to_bits(), 0]
     }
 
     /// Records an operation over the nodes.
@@ -227,7 +236,7 @@ impl GpuBackend {
 
     /// Records y = a M x, or y += a M x; nothing where the gate's solver has stopped.
     pub(super) fn product(&self, a: f64, m: &GpuMatrix, [x, y]: [&GpuVector; 2], fresh: bool, gate: &Memory) {
-        let numbers = [self.nodes as u32, u32::from(fresh), (a as f32).to_bits(), 0];
+        let numbers = [self.nodes() as u32, u32::from(fresh), (a as f32).to_bits(), 0];
         let storage = [&m.offsets, &m.columns, &m.entries, &*x.memory, &*y.memory, gate];
         self.run(Operation::Product, numbers, &storage);
     }
@@ -267,17 +276,21 @@ impl Backend for GpuBackend {
 
     fn upload(&self, values: &[[f64; 3]]) -> GpuVector {
         let x = self.vector();
-        let masks = self.masks.iter();
-        let content: Vec<[f32; 4]> =
-            values.iter().zip(masks).map(|(v, &mask)| [v[0] as f32, v[1] as f32, v[2] as f32, mask]).collect();
+        let mut content: Vec<[f32; 4]> = self.masks.iter().map(|mask| [0.0, 0.0, 0.0, *mask]).collect();
+        for (place, v) in self.order.places.iter().zip(values) {
+            content[*place as usize][..3].copy_from_slice(&v.map(|x| x as f32));
+        }
         self.recorder.write(&x.memory, &content);
         x
     }
 
     fn download(&self, x: &GpuVector) -> Vec<[f64; 3]> {
-        match self.recorder.read::<[f32; 4]>(&x.memory, self.nodes) {
-            Some(values) => values.into_iter().map(|[x, y, z, _]| [x, y, z].map(f64::from)).collect(),
-            None => vec![[f64::NAN; 3]; self.nodes],
+        match self.recorder.read::<[f32; 4]>(&x.memory, self.nodes()) {
+            Some(values) => {
+                let at = |place: &u32| values[*place as usize];
+                self.order.places.iter().map(at).map(|[x, y, z, _]| [x, y, z].map(f64::from)).collect()
+            }
+            None => vec![[f64::NAN; 3]; self.nodes()],
         }
     }
 
@@ -307,6 +320,7 @@ impl Backend for GpuBackend {
 
     fn matrix(&self, matrix: &MassMatrix) -> GpuMatrix {
         let filled = "the backend was made for a body with this matrix";
+        let matrix = matrix.placed(&self.order.places);
         let entries: Vec<f32> = matrix.values.iter().map(|&v| v as f32).collect();
         GpuMatrix {
             offsets: self.recorder.filled("rows of the mass", &matrix.offsets).expect(filled),

@@ -1,7 +1,7 @@
 //! The elements of a body on a GPU: two passes (Faure et al. 2012, Algorithm 1), a page of the mesh at a time.
 //!
-//! Pass 1: one invocation an element writes the partial force of each of its nodes into that node's own slot. Pass 2: one
-//! invocation a node sums its slots in ascending order. No two invocations write one place. A page is as much of the mesh
+//! Pass 1: one invocation an element writes the partial force of each of its nodes into a slot of its own. Pass 2: one
+//! invocation a node sums the slots of its elements in ascending order. No two invocations write one place. A page is as much of the mesh
 //! as the device can bind; smaller bodies have one. Pages take turns with one buffer of slots.
 
 use std::collections::HashMap;
@@ -83,8 +83,10 @@ impl GpuField {
         let options = backend.options();
         let limit = recorder.gpu().limits().storage_binding_bytes;
         let limit = options.binding_bytes.map_or(limit, |bytes| bytes.min(limit));
-        let made =
-            |of: &dyn Fn(&LawBatch) -> bool| pages(&recorder, body, body.batches.iter().filter(|b| of(b)), limit);
+        let made = |of: &dyn Fn(&LawBatch) -> bool| {
+            let batches = body.batches.iter().zip(&backend.order().elements).filter(|(b, _)| of(b));
+            pages(&recorder, (body, &backend.order().places), batches, limit)
+        };
         let dissipative = |b: &LawBatch| b.law.damping.is_some();
         let mixed = body.is_viscous() && !body.batches.iter().all(dissipative);
         let damped = if mixed { Some(made(&dissipative)?) } else { None };
@@ -184,7 +186,7 @@ impl GpuField {
             let invocations = count.div_ceil(self.elements_per_invocation as usize);
             let groups = self.recorder.groups(invocations, self.work_group_size);
             let keeps = u32::from(pass == Pass::Force && self.domains == Domains::Kept);
-            self.recorder.dispatch(&compiled.kernel, [count as u32, keeps, 0, 0], &storage, groups);
+            self.recorder.dispatch(&compiled.kernel, [count as u32, keeps, range.first_slot, 0], &storage, groups);
         }
     }
 
@@ -194,7 +196,6 @@ impl GpuField {
             Binding::Nodes => Some(&range.nodes),
             Binding::Rest => Some(&range.rest),
             Binding::Constants => Some(&range.constants),
-            Binding::SlotIndex => Some(&range.slot_index),
             Binding::Slots => Some(&self.slots),
             Binding::Margins => range.margins.as_ref(),
             Binding::Energies | Binding::Stresses => range.output.as_ref(),
@@ -204,7 +205,7 @@ impl GpuField {
             Binding::Gate => Some(bound.gate.unwrap_or(&self.gate)),
             Binding::ElementPass
             | Binding::NodePass
-            | Binding::Offsets
+            | Binding::Incidence
             | Binding::Sum
             | Binding::Masses
             | Binding::Product
@@ -217,7 +218,7 @@ impl GpuField {
     fn node_pass(&mut self, of: Of, page: usize, nodes: usize, factor: f64, y: &GpuVector) {
         let compiled = self.node_pass_of(false);
         let numbers = [nodes as u32, 0, (factor as f32).to_bits(), 0];
-        let storage = [&self.slots, &self.pages_of(of)[page].offsets, y.memory()];
+        let storage = [&self.slots, &self.pages_of(of)[page].incidence, y.memory()];
         let groups = self.recorder.groups(nodes, self.work_group_size);
         self.recorder.dispatch(&compiled.kernel, numbers, &storage, groups);
     }
@@ -252,7 +253,7 @@ impl GpuField {
             let numbers = [nodes as u32, u32::from(mass.is_some()), factors[0], factors[1]];
             let storage = [
                 &self.slots,
-                &self.pages_of(of)[page].offsets,
+                &self.pages_of(of)[page].incidence,
                 x.memory(),
                 masses.memory(),
                 y.memory(),

@@ -23,33 +23,40 @@ pub(super) struct Range {
     pub nodes: Memory,
     pub rest: Memory,
     pub constants: Memory,
-    pub slot_index: Memory,
+    /// The first slot of its first element.
+    pub first_slot: u32,
     /// Only where the law has a domain.
     pub margins: Option<Memory>,
     /// For what an output pass writes, made when one is asked for.
     pub output: Option<Memory>,
 }
 
-/// Elements whose slots fit into one binding, and where each node's slots begin.
+/// Elements whose slots fit into one binding, and the slots of each node.
 pub(super) struct Page {
     pub ranges: Vec<Range>,
-    pub offsets: Memory,
+    pub incidence: Memory,
 }
 
-/// A part of one batch: the batch, and which of its elements.
-type Part<'a> = (&'a LawBatch, std::ops::Range<usize>);
+/// A part of one batch: the batch, and which of its elements, in order.
+type Part<'a> = (&'a LawBatch, &'a [u32]);
 
-/// The elements of some batches in pages whose buffers have at most `limit` bytes.
+/// The mesh's numbers of the elements of a part.
+fn elements<'a>((batch, part): Part<'a>) -> impl Iterator<Item = u32> + Clone + 'a {
+    part.iter().map(|place| batch.elements[*place as usize])
+}
+
+/// The elements of some batches, in the order that is given for each, in pages whose buffers have at most `limit` bytes.
+/// Nodes are given by their places in vectors.
 ///
 /// # Errors
 /// A buffer is larger than the device can bind.
 pub(super) fn pages<'a>(
     recorder: &Recorder,
-    body: &Body,
-    batches: impl Iterator<Item = &'a LawBatch>,
+    (body, places): (&Body, &[u32]),
+    batches: impl Iterator<Item = (&'a LawBatch, &'a Vec<u32>)>,
     limit: u64,
 ) -> Result<Vec<Page>, DeviceError> {
-    paged(batches, limit).iter().map(|parts| Page::new(recorder, body, parts)).collect()
+    paged(batches, limit).iter().map(|parts| Page::new(recorder, (body, places), parts)).collect()
 }
 
 /// Bytes an element in the largest of a batch's buffers.
@@ -60,10 +67,10 @@ fn widest(batch: &LawBatch) -> u64 {
     (SLOT_BYTES * info.nodes as u64).max(rest).max(constants)
 }
 
-fn paged<'a>(batches: impl Iterator<Item = &'a LawBatch>, limit: u64) -> Vec<Vec<Part<'a>>> {
+fn paged<'a>(batches: impl Iterator<Item = (&'a LawBatch, &'a Vec<u32>)>, limit: u64) -> Vec<Vec<Part<'a>>> {
     let mut pages = vec![];
     let (mut page, mut room) = (vec![], limit);
-    for batch in batches {
+    for (batch, order) in batches {
         // A range's rest data end with the slopes of its reference element.
         let (widest, table) = (widest(batch), 16 * slopes(batch.element.info).len() as u64);
         let mut start = 0;
@@ -76,7 +83,7 @@ fn paged<'a>(batches: impl Iterator<Item = &'a LawBatch>, limit: u64) -> Vec<Vec
             }
             // A device that cannot bind one element cannot be used; the buffer's own error says so.
             let end = (start + fits.max(1)).min(batch.elements.len());
-            page.push((batch, start..end));
+            page.push((batch, &order[start..end]));
             room = room.saturating_sub(table + widest * (end - start) as u64);
             start = end;
         }
@@ -102,23 +109,20 @@ fn by_fours<'a>(n: usize, rows: impl Iterator<Item = &'a [u32]> + Clone) -> Vec<
 }
 
 impl Page {
-    fn new(recorder: &Recorder, body: &Body, parts: &[Part]) -> Result<Self, DeviceError> {
-        let elements = parts.iter().flat_map(|(batch, part)| &batch.elements[part.clone()]);
-        let nodes = elements.flat_map(|e| &body.elements[*e as usize]).map(|n| *n as usize);
+    fn new(recorder: &Recorder, (body, places): (&Body, &[u32]), parts: &[Part]) -> Result<Self, DeviceError> {
+        let elements = parts.iter().flat_map(|part| elements(*part));
+        let nodes = elements.flat_map(|e| &body.elements[e as usize]).map(|n| places[*n as usize] as usize);
         let incidence = Incidence::of_slots(body.masses.len(), nodes.collect::<Vec<_>>().into_iter());
-        // The slots of a node follow each other.
-        let mut slot_index = vec![0; incidence.slots().len()];
-        for (place, &slot) in incidence.slots().iter().enumerate() {
-            slot_index[slot as usize] = place as u32;
+        // Where lists begin is counted from the beginning of the buffer that holds them too.
+        let before = incidence.offsets().len() as u32;
+        let offsets = incidence.offsets().iter().map(|offset| before + offset);
+        let lists: Vec<u32> = offsets.chain(incidence.slots().iter().copied()).collect();
+        let (mut ranges, mut first_slot) = (vec![], 0);
+        for part in parts {
+            ranges.push(Range::new(recorder, (body, places), *part, first_slot)?);
+            first_slot += (part.1.len() * part.0.element.info.nodes) as u32;
         }
-        let mut rest = slot_index.as_slice();
-        let mut ranges = vec![];
-        for (batch, part) in parts {
-            let (own, others) = rest.split_at(part.len() * batch.element.info.nodes);
-            rest = others;
-            ranges.push(Range::new(recorder, body, batch, part.clone(), own)?);
-        }
-        Ok(Self { ranges, offsets: recorder.filled("slots of nodes", incidence.offsets())? })
+        Ok(Self { ranges, incidence: recorder.filled("slots of nodes", &lists)? })
     }
 
     /// Bytes of the slots of all its elements.
@@ -130,19 +134,21 @@ impl Page {
 impl Range {
     fn new(
         recorder: &Recorder,
-        body: &Body,
-        batch: &LawBatch,
-        part: std::ops::Range<usize>,
-        slot_index: &[u32],
+        (body, places): (&Body, &[u32]),
+        (batch, part): Part,
+        first_slot: u32,
     ) -> Result<Self, DeviceError> {
         let (info, count) = (batch.element.info, batch.law.info.constants.len());
-        let constants = if batch.per_element {
-            &batch.constants[part.start * count..part.end * count]
+        let constants: Vec<f32> = if batch.per_element {
+            let of_element = |place: &u32| &batch.constants[*place as usize * count..][..count];
+            part.iter().flat_map(of_element).map(|c| *c as f32).collect()
         } else {
-            batch.constants.as_slice()
+            batch.constants.iter().map(|c| *c as f32).collect()
         };
-        let elements = batch.elements[part].to_vec();
-        let nodes = by_fours(info.nodes, elements.iter().map(|&e| &body.elements[e as usize]));
+        let elements: Vec<u32> = elements((batch, part)).collect();
+        let of_elements = elements.iter().flat_map(|&e| &body.elements[e as usize]);
+        let nodes: Vec<u32> = of_elements.map(|n| places[*n as usize]).collect();
+        let nodes = by_fours(info.nodes, nodes.chunks_exact(info.nodes));
         let row = |(q, k): (usize, usize)| {
             elements.iter().map(move |&e| {
                 let point = &body.rest[e as usize][q];
@@ -152,14 +158,12 @@ impl Range {
         };
         let rows = (0..info.points.len()).flat_map(|q| (0..3).map(move |k| (q, k)));
         let rest: Vec<[f32; 4]> = rows.flat_map(row).chain(slopes(info)).collect();
-        let constants: Vec<f32> = constants.iter().map(|&c| c as f32).collect();
         // A law whose stress tells a margin has a domain.
         let has_margin = Pass::Force.function(batch.law).is_some_and(|f| f.field.is_some());
         let margins = match has_margin {
             true => Some(recorder.memory("margins of elements", 4 * elements.len() as u64)?),
             false => None,
         };
-        let slot_index = by_fours(info.nodes, slot_index.chunks_exact(info.nodes));
         Ok(Self {
             law: batch.law,
             element: batch.element,
@@ -167,7 +171,7 @@ impl Range {
             nodes: recorder.filled("nodes of elements", &nodes)?,
             rest: recorder.filled("rest data of elements", &rest)?,
             constants: recorder.filled("constants of materials", &constants)?,
-            slot_index: recorder.filled("slots of elements", &slot_index)?,
+            first_slot,
             margins,
             output: None,
             elements,

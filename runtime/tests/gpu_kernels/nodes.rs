@@ -8,10 +8,11 @@ use tensormass_runtime::gpu::{Gpu, GpuOptions};
 use tensormass_runtime::history::History;
 use tensormass_runtime::mass::{MassMatrix, Masses};
 use tensormass_runtime::mesh::{Mesh, beam};
+use tensormass_runtime::order::DeviceOrder;
 use tensormass_runtime::{LawEntry, laws};
 use tensormass_testing::random::Rng;
 
-use crate::meshes::{boxes_beside_wedges, distorted, unit};
+use crate::meshes::{boxes_beside_wedges, distorted, renumbered, unit};
 use crate::states::{
     Analysis, Bound, Kernel, Vector, batches, compare, of_mesh, other_elements, representatives, single, vectors,
 };
@@ -238,6 +239,21 @@ fn sums_at_nodes_are_those_of_f64_rounded() {
         let run = || check(&gpu, &body, GpuOptions { binding_bytes, ..GpuOptions::default() }, &analysis, least);
         let first = run();
         assert!(first == run(), "a second run gives other bits");
+    }
+}
+
+/// Where nodes are numbered at random, elements and nodes have an order of their own.
+#[test]
+fn sums_of_any_numbering_are_those_of_f64_rounded() {
+    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let mesh = beam([5.0, 2.0, 2.0], [12, 6, 6], [0.5, -1.0, 2.0]).expect("a beam");
+    let laws = representatives();
+    let places = |body: &Body| DeviceOrder::of(body).places;
+    assert!(places(&Shared::of(&mesh, &laws, 0.02, 5).body).is_sorted(), "a beam is numbered layer by layer");
+    let body = Shared::of(&renumbered(&mesh, 3), &laws, 0.02, 5);
+    assert!(!places(&body.body).is_sorted());
+    for (least, binding_bytes) in [(1, None), (3, Some(SMALL))] {
+        check(&gpu, &body, GpuOptions { binding_bytes, ..GpuOptions::default() }, &Analysis::new(), least);
     }
 }
 

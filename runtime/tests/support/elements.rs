@@ -34,6 +34,22 @@ pub fn boxes_beside_wedges(cells: usize) -> Mesh {
     Mesh::new(of_boxes.nodes().to_vec(), blocks, Groups::default()).unwrap_or_else(|e| panic!("{e}"))
 }
 
+/// The mesh with its nodes numbered at random.
+pub fn renumbered(mesh: &Mesh, seed: u64) -> Mesh {
+    let mut order: Vec<usize> = (0..mesh.nodes().len()).collect();
+    let mut random = Random(seed);
+    order.sort_by_cached_key(|_| random.vector(1.0)[0].to_bits());
+    let mut number = vec![0; order.len()];
+    order.iter().enumerate().for_each(|(new, old)| number[*old] = new as u32);
+    let nodes = order.iter().map(|old| mesh.nodes()[*old]).collect();
+    let block = |block: &Block| {
+        let nodes = block.nodes.iter().map(|n| NodeId(number[n.index()])).collect();
+        Block { element: block.element, nodes }
+    };
+    let blocks = mesh.blocks().iter().map(block).collect();
+    Mesh::new(nodes, blocks, Groups::default()).unwrap_or_else(|e| panic!("{e}"))
+}
+
 /// The two corners between which each node lies, or the node itself twice; a corner is a node of the linear element.
 fn between(info: &ElementInfo) -> Vec<[usize; 2]> {
     let near = |a: f64, b: f64| (a - b).abs() < 1e-12;

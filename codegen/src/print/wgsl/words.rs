@@ -34,7 +34,7 @@ const LANGUAGE: &str = "
 /// Functions and variables of the passes around a kernel, except helpers, which say their own names. A test compares them
 /// with the passes.
 const OURS: &str = "
-    element_pass nodes rest constants displacement velocity increment slots slot_index margins energies stresses gate
+    element_pass nodes rest constants displacement velocity increment slots slot incidence margins energies stresses gate
     work_group_size elements_per_invocation constants_stride main element group groups local
     shape_gradients slopes inverse_jacobian nodal_displacement nodal_increment nodal_velocity
     gradient contract node_gradients energy force dforce diagonal cauchy damping ddamping damping_diagonal near far";
