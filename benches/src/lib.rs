@@ -1,5 +1,7 @@
 //! What the benchmarks share; they are in `benches/`.
 
+pub mod hand;
+
 use tensormass_runtime::measure::{Body, Subject, scene_text};
 use tensormass_runtime::model::{Model, build};
 use tensormass_runtime::scene::{Precision, TangentChoice, parse};

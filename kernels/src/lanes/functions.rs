@@ -72,19 +72,26 @@ fn between<V: Lanes>(x: V, low: f64, high: f64) -> bool {
     V::select_greater(x, V::from_f64(low), V::select_greater(V::from_f64(high), x, one, zero), zero).is_positive()
 }
 
-/// k ln 2 + ln(1 + f) + rest, for 1 + f within a factor of the square root of 2 of 1.
+/// f^2 / 2, and what s = f / (2 + f) multiplies in ln(1 + f) = f - f^2 / 2 + s (f^2 / 2 + s^2 (2/3 + 2/5 s^2 + ..)), for
+/// 1 + f within a factor of the square root of 2 of 1; and s.
 #[inline(always)]
-fn sum<V: Parts>(k: V, f: V, rest: V) -> V {
+fn parts<V: Parts>(f: V) -> [V; 3] {
     let s = f / (V::from_f64(2.0) + f);
     let z = s * s;
     let mut series = V::from_f64(0.0);
     for n in (1..=<V::Scalar as Constants>::LN_TERMS).rev() {
         series = series.mul_add(z, V::from_f64(2.0 / (2 * n + 1) as f64));
     }
-    // ln(1 + f) = 2 s + s z (2/3 + ..), and 2 s = f - f^2/2 + s f^2/2.
     let half_square = V::from_f64(0.5) * f * f;
+    [half_square, z.mul_add(series, half_square), s]
+}
+
+/// k ln 2 + ln(1 + f) + rest, for such an f.
+#[inline(always)]
+fn sum<V: Parts>(k: V, f: V, rest: V) -> V {
+    let [half_square, factor, s] = parts(f);
     let [high, low] = <V::Scalar as Constants>::LN_2.map(V::from_f64);
-    let small = s.mul_add(z.mul_add(series, half_square), k.mul_add(low, rest));
+    let small = s.mul_add(factor, k.mul_add(low, rest));
     k * high - ((half_square - small) - f)
 }
 
@@ -106,6 +113,11 @@ pub(crate) fn ln<V: Parts>(x: V) -> V {
 
 #[inline(always)]
 pub(crate) fn ln_1p<V: Parts>(x: V) -> V {
+    // Mostly all lanes are near 1: bit for bit what follows, where k is 0.
+    if between(x, -0.29, 0.41) {
+        let [half_square, factor, s] = parts(x);
+        return x - (half_square - s * factor);
+    }
     let [low, high] = <V::Scalar as Constants>::LOGARITHM;
     let (zero, one) = (V::from_f64(0.0), V::from_f64(1.0));
     let u = one + x;
