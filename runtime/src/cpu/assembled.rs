@@ -41,7 +41,6 @@ pub(super) struct Assembled<R> {
 }
 
 /// The pairs of nodes that the elements of a cluster join.
-#[derive(Default)]
 struct Pairs {
     /// Of each pair of nodes of each element, by blocks and lanes, the place of its block among those of the cluster, of
     /// which each pair has two: that of the other one where the element has the block's transpose.
@@ -75,13 +74,18 @@ fn keys<R: Precision>(cluster: &Cluster, part: Part<R>, nodes: usize, lanes: usi
     keys
 }
 
-impl<R: Precision> Assembled<R> {
-    /// A matrix without numbers for the clusters of a batch, on so many lanes.
-    pub fn new(clusters: &[Cluster], blocks: &Blocks<R>, lanes: usize) -> Self {
-        let nodes = blocks.nodes();
-        let parts = || clusters.par_iter().enumerate().map(|(k, cluster)| (k, cluster, blocks.part(k)));
-        let all: Vec<Vec<Key>> = parts().map(|(_, cluster, part)| keys(cluster, part, nodes, lanes)).collect();
-        // Who meets a pair first owns it.
+/// Who owns which pairs: the first cluster that meets a pair.
+struct Owners {
+    /// The pairs of all clusters with the clusters that meet them, ascending.
+    met: Vec<(Key, u32)>,
+    /// Those that each cluster owns, ascending, and the others that it meets.
+    own: Vec<Vec<Key>>,
+    foreign: Vec<Vec<Key>>,
+}
+
+impl Owners {
+    /// From the pairs that each cluster meets.
+    fn of(all: &[Vec<Key>]) -> Self {
         let numbered = all.iter().zip(0_u32..).flat_map(|(keys, k)| keys.iter().map(move |key| (*key, k)));
         let mut met: Vec<(Key, u32)> = numbered.collect();
         met.par_sort_unstable();
@@ -90,46 +94,74 @@ impl<R: Precision> Assembled<R> {
             own[of_pair[0].1 as usize].push(of_pair[0].0);
             of_pair[1..].iter().for_each(|(key, k)| foreign[*k as usize].push(*key));
         }
-        let local =
-            |(cluster, own): (&Cluster, &Vec<Key>)| own.iter().map(|key| key.map(|n| cluster.local(n))).collect();
-        let (matrix, at) = Matrix::new(lanes, &clusters.iter().zip(&own).map(local).collect::<Vec<_>>());
-        let place = |k: usize, key: &Key| match own[k].binary_search(key) {
+        Self { met, own, foreign }
+    }
+
+    /// The place of a pair among those of a cluster, of which its own have the first.
+    fn place(&self, cluster: usize, key: &Key) -> usize {
+        let own = &self.own[cluster];
+        match own.binary_search(key) {
             Ok(place) => place,
-            Err(_) => own[k].len() + foreign[k].partition_point(|other| other < key),
-        };
-        let mut joined: Vec<Pairs> = parts()
-            .map(|(k, cluster, part)| {
-                let mut places = vec![];
-                for block in part.nodes() {
-                    for [i, j] in pairs(nodes) {
-                        for lane in 0..lanes {
-                            let [i, j] = [i, j].map(|n| cluster.place(block[n * lanes + lane]));
-                            // `as u32` is exact: a cluster has far fewer pairs.
-                            let block = 2 * place(k, &key(i, j)) as u32 + u32::from(i > j);
-                            places.push(block_place::<R>(block));
-                        }
-                    }
+            Err(_) => own.len() + self.foreign[cluster].partition_point(|other| other < key),
+        }
+    }
+
+    /// Where the blocks are of each pair of nodes of the elements of a cluster, by blocks and lanes (see [`Pairs`]).
+    fn places<R: Precision>(&self, k: usize, cluster: &Cluster, part: Part<R>, [nodes, lanes]: [usize; 2]) -> Vec<u32> {
+        let mut places = vec![];
+        for block in part.nodes() {
+            for [i, j] in pairs(nodes) {
+                for lane in 0..lanes {
+                    let [i, j] = [i, j].map(|n| cluster.place(block[n * lanes + lane]));
+                    // `as u32` is exact: a cluster has far fewer pairs.
+                    let block = 2 * self.place(k, &key(i, j)) as u32 + u32::from(i > j);
+                    places.push(block_place::<R>(block));
                 }
-                Pairs { places, own: at[k].clone(), foreign: foreign[k].len(), shared: vec![] }
-            })
+            }
+        }
+        places
+    }
+}
+
+impl<R: Precision> Assembled<R> {
+    /// A matrix without numbers for the clusters of a batch, on so many lanes.
+    pub fn new(clusters: &[Cluster], blocks: &Blocks<R>, lanes: usize) -> Self {
+        let nodes = blocks.nodes();
+        let parts = || clusters.par_iter().enumerate().map(|(k, cluster)| (k, cluster, blocks.part(k)));
+        let all: Vec<Vec<Key>> = parts().map(|(_, cluster, part)| keys(cluster, part, nodes, lanes)).collect();
+        let owners = Owners::of(&all);
+        let local = |(cluster, own): (&Cluster, &Vec<Key>)| {
+            let pair = |key: &Key| key.map(|n| cluster.local(n));
+            own.iter().map(pair).collect()
+        };
+        let (matrix, at) = Matrix::new(lanes, &clusters.iter().zip(&owners.own).map(local).collect::<Vec<_>>());
+        let places: Vec<Vec<u32>> =
+            parts().map(|(k, cluster, part)| owners.places(k, cluster, part, [nodes, lanes])).collect();
+        let foreign: Vec<usize> = owners.foreign.iter().map(Vec::len).collect();
+        let mut joined: Vec<Pairs> = at
+            .into_iter()
+            .zip(places)
+            .zip(&foreign)
+            .map(|((own, places), foreign)| Pairs { places, own, foreign: *foreign, shared: vec![] })
             .collect();
-        let mut first_slot = vec![0];
-        for keys in &foreign {
-            first_slot.push(first_slot[first_slot.len() - 1] + keys.len());
-        }
+        let before = |sum: &mut usize, count: &usize| {
+            *sum += count;
+            Some(*sum - count)
+        };
+        // The first slot of each cluster.
+        let first: Vec<usize> = foreign.iter().scan(0, before).collect();
         let mut slots = vec![];
-        for of_pair in met.chunk_by(|a, b| a.0 == b.0).filter(|of_pair| of_pair.len() > 1) {
+        for of_pair in owners.met.chunk_by(|a, b| a.0 == b.0).filter(|of_pair| of_pair.len() > 1) {
             let start = slots.len() as u32;
-            let slot = |(key, k): &(Key, u32)| {
+            for (key, k) in &of_pair[1..] {
                 let k = *k as usize;
-                (first_slot[k] + place(k, key) - own[k].len()) as u32
-            };
-            slots.extend(of_pair[1..].iter().map(slot));
-            let (key, owner) = of_pair[0];
-            let at = at[owner as usize][place(owner as usize, &key)];
-            joined[owner as usize].shared.push((at, start..slots.len() as u32));
+                slots.push((first[k] + owners.place(k, key) - owners.own[k].len()) as u32);
+            }
+            let (key, owner) = (of_pair[0].0, of_pair[0].1 as usize);
+            let at = joined[owner].own[owners.place(owner, &key)];
+            joined[owner].shared.push((at, start..slots.len() as u32));
         }
-        let foreign = vec![[R::default(); 9]; first_slot[all.len()]];
+        let foreign = vec![[R::default(); 9]; foreign.iter().sum()];
         Self { matrix, clusters: joined, foreign, slots, is_filled: false }
     }
 
