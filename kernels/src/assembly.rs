@@ -15,7 +15,7 @@ pub const fn block_place<R>(block: u32) -> u32 {
 
 /// The pairs of an element's nodes, in the order in which their blocks are computed.
 pub fn pairs(nodes: usize) -> impl Iterator<Item = [usize; 2]> {
-    (0..nodes).flat_map(|j| (0..=j).map(move |i| [i, j]))
+    (1..nodes).flat_map(|j| (0..j).map(move |i| [i, j]))
 }
 
 /// The differential dP at each quadrature point, for each component of dG that is 1 where the others are 0.
@@ -45,7 +45,7 @@ pub(crate) fn assemble<V: Lanes>(
     let mut of_node = vec![[V::from_f64(0.0); 27]; points];
     let mut places = places.chunks_exact(V::COUNT);
     for block in 0..count {
-        for j in 0..nodes {
+        for j in 1..nodes {
             for (q, of_node) in of_node.iter_mut().enumerate() {
                 let point = block * points + q;
                 let (_, weight) = blocks.rest::<V>(first + block, q);
@@ -59,7 +59,7 @@ pub(crate) fn assemble<V: Lanes>(
                     }
                 }
             }
-            for i in 0..=j {
+            for i in 0..j {
                 let mut sums = [V::from_f64(-0.0); 9];
                 for (q, of_node) in of_node.iter().enumerate() {
                     let gradient = &gradients[(block * points + q) * nodes + i];

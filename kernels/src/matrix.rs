@@ -1,8 +1,12 @@
-//! A symmetric matrix over the nodes of clusters, in blocks of 3 x 3 numbers, as lanes meet it.
+//! The tangent as a symmetric matrix over the nodes of clusters, in blocks of 3 x 3 numbers, as lanes meet it.
 //!
-//! Of two nodes that are joined one block is kept, which serves both. A lane has a row: as many rows of a cluster as there
-//! are lanes make a chunk, which meets the blocks of the diagonal in its first step, and one more block of each row in each
-//! step after it. Rows with about as many blocks share a chunk (sliced ELLPACK of sorted rows: Kreutzer et al. 2014).
+//! Of two nodes that are joined one block B is kept, which serves both: y_i += B (x_j - x_i), y_j -= B' (x_j - x_i). A body
+//! that is moved as a whole has no forces, so that the blocks of a row add up to nothing and that of the diagonal is not
+//! needed. Nor would it do: products with x itself leave roundings of the size of the motion, differences leave those of the
+//! strain and of the turn, as products over elements do.
+//!
+//! A lane has a row: as many rows of a cluster as there are lanes make a chunk, which meets one block of each row in each
+//! step. Rows with about as many blocks share a chunk (sliced ELLPACK of sorted rows: Kreutzer et al. 2014).
 #![allow(unsafe_code)]
 
 use std::ops::Range;
@@ -16,11 +20,11 @@ use crate::real::Real;
 #[derive(Debug)]
 pub struct Matrix<R> {
     lanes: usize,
-    /// Of each step a node for each lane: that of its row in the first step of a chunk, that of the column in others.
+    /// Of each chunk the nodes of its rows, and of each of its steps those of the columns, a lane each.
     places: Aligned<Place>,
     /// Of each step the numbers of its blocks, each lane after lane.
     numbers: Aligned<R>,
-    /// The first step of each chunk, and where the last one ends.
+    /// The first step of each chunk, and where the last one ends: chunk k has k sets of rows before its own.
     steps: Vec<u32>,
     /// The first chunk of each cluster, and where the last one ends.
     chunks: Vec<u32>,
@@ -38,29 +42,23 @@ pub struct Rows<'a, R> {
 /// A row that is dealt to a lane: its blocks, by number, and the column of each.
 struct Row {
     node: u32,
-    diagonal: Option<usize>,
-    others: Vec<(usize, u32)>,
+    blocks: Vec<(usize, u32)>,
 }
 
 /// The rows of a cluster, the longest first.
 fn rows(blocks: &[[u32; 2]], nodes: usize) -> Vec<Row> {
-    let mut rows: Vec<Row> = (0..).take(nodes).map(|node| Row { node, diagonal: None, others: vec![] }).collect();
+    let mut rows: Vec<Row> = (0..).take(nodes).map(|node| Row { node, blocks: vec![] }).collect();
     for (k, [row, column]) in blocks.iter().enumerate() {
-        let at = &mut rows[*row as usize];
-        if row == column {
-            at.diagonal = Some(k);
-        } else {
-            at.others.push((k, *column));
-        }
+        rows[*row as usize].blocks.push((k, *column));
     }
-    rows.retain(|row| row.diagonal.is_some() || !row.others.is_empty());
-    rows.sort_by_key(|row| std::cmp::Reverse(row.others.len()));
+    rows.retain(|row| !row.blocks.is_empty());
+    rows.sort_by_key(|row| std::cmp::Reverse(row.blocks.len()));
     rows
 }
 
 impl<R: Real + Default> Matrix<R> {
-    /// A matrix of zeros for clusters with these blocks, each given by its row and its column, which are nodes of the
-    /// cluster; no block is given twice, nor as its transpose. And where among the numbers of its cluster
+    /// A matrix of zeros for clusters with these blocks, each given by its row and its column, which are different nodes of
+    /// the cluster; no block is given twice, nor as its transpose. And where among the numbers of its cluster
     /// ([`Matrix::parts_mut`]) the first number of each block is; the others follow at distances of as many as there are
     /// lanes.
     ///
@@ -69,40 +67,37 @@ impl<R: Real + Default> Matrix<R> {
     pub fn new(lanes: usize, clusters: &[Vec<[u32; 2]>]) -> (Self, Vec<Vec<u32>>) {
         let (mut steps, mut chunks, mut reach) = (vec![0], vec![0], 1);
         let (mut places, mut at): (Vec<Place>, Vec<Vec<u32>>) = (vec![], vec![]);
+        let place = |node: u32| (node as usize * stride::<R>()) as Place;
+        let (mut step, mut all) = (0, 0);
         for blocks in clusters {
             let nodes = blocks.iter().flatten().max().map_or(0, |n| *n as usize + 1);
             assert!(nodes <= most_nodes::<R>(), "a cluster of {nodes} nodes is too large");
             reach = reach.max(nodes);
-            let (before, mut here) = (places.len(), vec![0; blocks.len()]);
+            let (before, mut here) = (step, vec![0; blocks.len()]);
             for chunk in rows(blocks, nodes).chunks(lanes) {
-                for step in 0..=chunk[0].others.len() {
-                    let numbers = 9 * (places.len() - before);
+                // Lanes without a row have the last one once more, with zeros, as have those whose row has no more blocks.
+                let row = |lane: usize| &chunk[lane.min(chunk.len() - 1)];
+                places.extend((0..lanes).map(|lane| place(row(lane).node)));
+                for k in 0..chunk[0].blocks.len() {
                     for lane in 0..lanes {
-                        // Where a lane has no block, a row meets itself: with zeros.
-                        let row = &chunk[lane.min(chunk.len() - 1)];
-                        let block = match step.checked_sub(1) {
-                            None => row.diagonal.map(|k| (k, row.node)),
-                            Some(k) => row.others.get(k).copied(),
-                        };
-                        let column = match block.filter(|_| lane < chunk.len()) {
-                            Some((k, column)) => {
-                                // `as u32` is exact: a cluster has far fewer numbers.
-                                here[k] = (numbers + lane) as u32;
-                                column
-                            }
-                            None => row.node,
-                        };
-                        places.push((column as usize * stride::<R>()) as Place);
+                        let block = row(lane).blocks.get(k).filter(|_| lane < chunk.len());
+                        if let Some((block, _)) = block {
+                            // `as u32` is exact: a cluster has far fewer numbers.
+                            here[*block] = (9 * (step - before) * lanes + lane) as u32;
+                        }
+                        places.push(place(block.map_or(row(lane).node, |(_, column)| *column)));
                     }
+                    step += 1;
                 }
-                steps.push((places.len() / lanes) as u32);
+                steps.push(step as u32);
+                all += 1;
             }
-            chunks.push(steps.len() as u32 - 1);
+            chunks.push(all);
             at.push(here);
         }
         let mut aligned = Aligned::zeros(places.len());
         aligned.all_mut().copy_from_slice(&places);
-        (Self { lanes, places: aligned, numbers: Aligned::zeros(9 * places.len()), steps, chunks, reach }, at)
+        (Self { lanes, places: aligned, numbers: Aligned::zeros(9 * step * lanes), steps, chunks, reach }, at)
     }
 
     /// The numbers of each cluster.
@@ -125,19 +120,14 @@ impl<R> Matrix<R> {
         Rows { matrix: self, chunks: self.chunks[cluster] as usize..self.chunks[cluster + 1] as usize }
     }
 
-    /// Bytes of it.
-    pub fn bytes(&self) -> usize {
-        size_of_val(self.places.all()) + size_of_val(self.numbers.all()) + 4 * (self.steps.len() + self.chunks.len())
-    }
-
-    /// The nodes of a step.
+    /// The nodes of a set: of the rows of a chunk, or of the columns of a step.
     ///
     /// # Panics
     /// The matrix has other lanes, or there are fewer nodes than it has.
     #[inline(always)]
-    fn places<V: Lanes<Scalar = R>>(&self, step: usize, nodes: &[Node<R>]) -> &[Place] {
+    fn places<V: Lanes<Scalar = R>>(&self, set: usize, nodes: &[Node<R>]) -> &[Place] {
         assert!(V::COUNT == self.lanes && nodes.len() >= self.reach, "a matrix of other lanes or nodes");
-        &self.places.all()[step * V::COUNT..][..V::COUNT]
+        &self.places.all()[set * V::COUNT..][..V::COUNT]
     }
 }
 
@@ -164,37 +154,24 @@ pub(crate) fn multiply<V: Lanes>(rows: &Rows<V::Scalar>, x: &[Node<V::Scalar>], 
     let Rows { matrix, chunks } = rows;
     for chunk in chunks.clone() {
         let [first, end] = [chunk, chunk + 1].map(|chunk| matrix.steps[chunk] as usize);
-        let row = matrix.places::<V>(first, x);
+        let row = matrix.places::<V>(first + chunk, x);
         // SAFETY: `places` says so, here and below.
         let x_row = unsafe { V::gather(x, row) };
-        let mut y_row = product(&matrix.blocks::<V>(first), ROWS, &x_row, None);
-        for step in first + 1..end {
-            let column = matrix.places::<V>(step, x);
+        let mut y_row = [V::from_f64(-0.0); 3];
+        for step in first..end {
+            let column = matrix.places::<V>(step + chunk + 1, x);
             let block = matrix.blocks::<V>(step);
             let x_column = unsafe { V::gather(x, column) };
-            y_row = product(&block, ROWS, &x_column, Some(&y_row));
-            unsafe { V::scatter(product(&block, COLUMNS, &x_row, None), y, column) };
+            let apart = [x_column[0] - x_row[0], x_column[1] - x_row[1], x_column[2] - x_row[2]];
+            let mut y_column = [V::from_f64(-0.0); 3];
+            for a in 0..3 {
+                for c in 0..3 {
+                    y_row[a] = block[3 * a + c].multiply_add(apart[c], y_row[a]);
+                    y_column[a] = block[3 * c + a].multiply_add(-apart[c], y_column[a]);
+                }
+            }
+            unsafe { V::scatter(y_column, y, column) };
         }
         unsafe { V::scatter(y_row, y, row) };
     }
-}
-
-/// Numbers of a block, row by row.
-const ROWS: [usize; 9] = [0, 1, 2, 3, 4, 5, 6, 7, 8];
-/// Numbers of a block, column by column: those of its transpose.
-const COLUMNS: [usize; 9] = [0, 3, 6, 1, 4, 7, 2, 5, 8];
-
-/// A x, with the numbers of A in this order, added to a sum if there is one.
-#[inline(always)]
-fn product<V: Lanes>(block: &[V; 9], order: [usize; 9], x: &[V; 3], sum: Option<&[V; 3]>) -> [V; 3] {
-    let mut y = *x;
-    for a in 0..3 {
-        let row = [block[order[3 * a]], block[order[3 * a + 1]], block[order[3 * a + 2]]];
-        y[a] = match sum {
-            Some(sum) => row[0].multiply_add(x[0], sum[a]),
-            None => row[0] * x[0],
-        };
-        y[a] = row[2].multiply_add(x[2], row[1].multiply_add(x[1], y[a]));
-    }
-    y
 }

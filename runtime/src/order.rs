@@ -83,8 +83,7 @@ pub fn sharing(body: &Body) -> Sharing {
     Sharing { foreign: foreign.clone().sum(), shared: foreign.filter(|n| *n > 0).count() }
 }
 
-/// Pairs of nodes that elements of a batch join, those of a node with itself among them, one counted for each cluster that
-/// has it.
+/// Pairs of nodes that elements of a batch join, one counted for each cluster that has it.
 pub fn blocks_of_clusters(body: &Body, batch: &LawBatch) -> usize {
     let info = batch.element.info;
     let distinct = |elements: &[u32]| {

@@ -267,7 +267,7 @@ pub(crate) fn tangent_operations(law: &LawInfo) -> u32 {
 /// [`tangent_operations`] begins with; its products with the gradient of each node, and theirs with that of each other.
 fn assembly_operations(law: &LawInfo, element: &ElementInfo) -> u32 {
     let (nodes, pairs) = (element.nodes as u32, pairs(element.nodes).count() as u32);
-    point_operations(law, "linearize") + 9 * tangent_operations(law) + nodes * (3 + 27 * 5) + pairs * 27 * 2
+    point_operations(law, "linearize") + 9 * tangent_operations(law) + (nodes - 1) * (3 + 27 * 5) + pairs * 27 * 2
 }
 
 /// The kernels of a law's damping, each with its operations an element.

@@ -4,7 +4,8 @@
 //! with a sum. Storing saves operations in every product and costs memory that every product reads: little while it stays
 //! in a cache, more than the operations of a cheap law where it does not. A matrix takes fewer operations still, and of
 //! simple elements fewer numbers; but it takes several products' time to assemble, and what is rounded in it no longer
-//! knows that a rigid motion costs nothing. In f32 that loses digits where stiffnesses differ, so that it has to be asked for.
+//! knows that a turned body has no forces. Where stiffnesses differ by a factor of a thousand that loses two digits or
+//! three, of a million four: the rule takes a matrix in f64 and of bodies of one material alone.
 
 use serde::Serialize;
 
@@ -38,9 +39,18 @@ pub fn by_rule(body: &Body, real: usize) -> Vec<Tangent> {
     let in_cache = real * body.batches.iter().map(numbers).sum::<usize>() <= CACHE;
     let choice = |b: &LawBatch| {
         let free = if in_cache || saves(b) { Tangent::Stored } else { Tangent::Recomputed };
-        if real == size_of::<f64>() && assembling_saves(body, b, free) { Tangent::Assembled } else { free }
+        let is_exact = real == size_of::<f64>() && is_one_material(body);
+        if is_exact && assembling_saves(body, b, free) { Tangent::Assembled } else { free }
     };
     body.batches.iter().map(choice).collect()
+}
+
+/// Whether a body is stiff in the same way everywhere, however its materials are given.
+fn is_one_material(body: &Body) -> bool {
+    let [batch] = body.batches.as_slice() else { return false };
+    let mut sets = batch.constants.chunks_exact(batch.law.info.constants.len().max(1));
+    let first = sets.next();
+    sets.all(|set| Some(set) == first)
 }
 
 /// Whether a product with a matrix costs so much less than one without that the matrix is worth assembling: less where that
@@ -54,8 +64,8 @@ fn assembling_saves(body: &Body, batch: &LawBatch, free: Tangent) -> bool {
     };
     let cost = |numbers: usize, operations: usize| PRICE as usize * numbers + operations;
     let free = points * cost(numbers, (operations + element.contract_operations) as usize);
-    // Each block serves two nodes with 18 operations each.
-    let assembled = blocks(body, batch) * cost(9, 36);
+    // Each block serves two nodes with 18 operations each, and their difference.
+    let assembled = blocks(body, batch) * cost(9, 39);
     if law.structure.linear { assembled < free } else { 2 * assembled < free }
 }
 
@@ -70,7 +80,7 @@ fn saves(batch: &LawBatch) -> bool {
     anew(batch).saturating_sub(tangent_operations(law)) >= PRICE * law.stored as u32
 }
 
-/// Blocks of the assembled tangent of a batch: one for each node, and one for each two nodes that an element joins.
+/// Blocks of the assembled tangent of a batch: one for each two nodes that an element joins.
 pub fn blocks(body: &Body, batch: &LawBatch) -> usize {
     let nodes = |e: &u32| &body.elements[*e as usize];
     let slots = batch.elements.iter().flat_map(nodes).map(|n| *n as usize);
@@ -81,7 +91,7 @@ pub fn blocks(body: &Body, batch: &LawBatch) -> usize {
     for (node, ends) in incidence.offsets().windows(2).enumerate() {
         for slot in &incidence.slots()[ends[0] as usize..ends[1] as usize] {
             let element = batch.elements[*slot as usize / batch.element.info.nodes];
-            for other in nodes(&element).iter().map(|n| *n as usize).filter(|other| *other >= node) {
+            for other in nodes(&element).iter().map(|n| *n as usize).filter(|other| *other > node) {
                 blocks += usize::from(met[other] != node);
                 met[other] = node;
             }

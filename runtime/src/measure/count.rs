@@ -26,7 +26,7 @@ pub(super) struct Layout {
     pub own: f64,
     /// How products with the tangent are computed.
     pub tangent: Tangent,
-    /// Blocks of the tangent an element, where it is assembled: those of nodes with themselves, and half the others.
+    /// Blocks of the tangent an element, where it is assembled.
     pub blocks: f64,
 }
 
@@ -86,8 +86,8 @@ impl Count<'_> {
             // Who stores nothing copies the state, and has to read it again.
             Tangent::Recomputed => (self.flops(vectors, "dforce", 1, true), self.two_passes(vectors, 0)),
             Tangent::Assembled => {
-                // A block serves twice, but for those of the diagonal; it knows one node besides that of its row.
-                let flops = 18.0 * (2.0 * blocks - self.nodes);
+                // A block serves twice, with a difference of vectors; it knows one node besides that of its row.
+                let flops = 39.0 * blocks;
                 let matrix = blocks * (9.0 * real + self.layout.place) + self.layout.local * self.layout.slots;
                 (flops.round() as u32, matrix + vector * self.nodes + self.sums())
             }
