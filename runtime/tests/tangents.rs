@@ -8,6 +8,8 @@ mod support;
 use meshes::unit;
 use serde_json::Value;
 use support::{body, done, parameters, repository, scene};
+use tensormass_runtime::backend::{Backend, ForceField};
+use tensormass_runtime::cpu::{CpuBackend, CpuField};
 use tensormass_runtime::mesh::beam_of;
 use tensormass_runtime::model::build;
 use tensormass_runtime::plan::{Layout, Plan};
@@ -58,6 +60,23 @@ fn matrices_are_assembled_where_they_save() {
         assert_eq!(assembled(4), 0, "{name}: in f32 a matrix has to be asked for");
         let (found, all) = (assembled(8), laws().len());
         assert!(if name == "tetrahedron_p2" { found < all } else { found == all }, "{name}: {found} of {all} laws");
+    }
+}
+
+/// A matrix of differences: a body that is moved as a whole has no force, and none of rounding.
+#[test]
+fn a_matrix_knows_that_moving_costs_nothing() {
+    for element in elements().iter().filter(|e| e.info.dimension == 3) {
+        for law in laws() {
+            let body = body(&unit(element, 2), law, &parameters(law), &[]);
+            let backend = CpuBackend::<f32>::new(&body);
+            let mut field = CpuField::<f32>::new(&backend, &body).with_tangents(&[Tangent::Assembled]);
+            let everywhere = |x: [f64; 3]| backend.upload(&vec![x; body.masses.len()]);
+            let (moved, mut force) = (everywhere([0.3, -1.7, 2.9]), backend.zeros());
+            field.prepare(&backend, &backend.zeros());
+            field.add_dforce(&backend, &moved, 1.0, &mut force);
+            assert_eq!(backend.max_abs(&force), 0.0, "{} of {}", element.info.name, law.info.name);
+        }
     }
 }
 
