@@ -1,14 +1,16 @@
 //! The elements of a batch as lanes meet them: blocks of as many elements as there are lanes, number by number.
 //!
-//! A block has the places of each node, lane after lane; of each quadrature point the nine numbers of J^-1 and the weight,
+//! A block has the places of each node, a row of lanes for each; of each quadrature point the nine numbers of J^-1 and the weight,
 //! lane after lane; and its constants likewise, where each element has its own. Blocks of a cluster follow each other, and
-//! clusters do; the last block of a cluster is filled up with its last element, without weight.
+//! clusters do; the last block of a cluster is filled up with its last element, without weight. The first blocks of a cluster
+//! may be those of strips ([`crate::strip`]): three blocks have six rows of places.
 #![allow(unsafe_code)]
 
 use crate::aligned::Aligned;
 use crate::element::RestPoint;
 use crate::lanes::{Lanes, Node, Place, stride};
 use crate::real::Real;
+use crate::strip::{self, MEMBERS, STRIP};
 
 /// What is stored of the state of a batch for products with its tangent: of each block numbers of one quadrature point
 /// after the other, lane after lane.
@@ -28,7 +30,7 @@ impl<R: Real + Default> States<R> {
 
     /// Those of a cluster, followed by those of the clusters after it.
     pub fn of(&self, part: Part<R>) -> &[R] {
-        &self.numbers.all()[part.first * self.each..]
+        &self.numbers.all()[part.span.first * self.each..]
     }
 
     /// Those of each cluster.
@@ -43,7 +45,24 @@ impl<R: Real + Default> States<R> {
     }
 }
 
-/// Elements of a cluster, as a runtime has them.
+/// How many elements a cluster has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Extent {
+    /// All of them.
+    pub elements: usize,
+    /// The first of them, so many times [`MEMBERS`] blocks, are strips.
+    pub strips: usize,
+}
+
+impl Extent {
+    /// Elements without strips.
+    pub fn of(elements: usize) -> Self {
+        Self { elements, strips: 0 }
+    }
+}
+
+/// Elements of a cluster, as a runtime has them. Of blocks of strips the first elements come first, of one lane after the
+/// other, then the second and the third ones, each with its nodes in the order of [`STRIP`].
 #[derive(Debug, Clone, Copy)]
 pub struct Cluster<'a, R> {
     /// The nodes of one element after the other, numbered within the cluster.
@@ -66,10 +85,20 @@ pub struct Blocks<R> {
     /// Constants of an element.
     constant_count: usize,
     per_element: bool,
-    /// The first block and the elements of each cluster.
-    parts: Vec<(usize, usize)>,
+    /// The range of each cluster.
+    parts: Vec<Span>,
     /// One more than the greatest node of a cluster.
     reach: usize,
+}
+
+/// Where a cluster is.
+#[derive(Debug, Clone, Copy)]
+struct Span {
+    /// Its first block.
+    first: usize,
+    /// Its first row of places.
+    row: usize,
+    extent: Extent,
 }
 
 /// The blocks of a cluster.
@@ -77,9 +106,22 @@ pub struct Blocks<R> {
 pub struct Part<'a, R> {
     /// Those of the batch.
     pub(crate) blocks: &'a Blocks<R>,
-    /// The first one.
-    pub(crate) first: usize,
-    elements: usize,
+    span: Span,
+}
+
+/// Blocks that follow each other and are all strips, or none.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Range {
+    /// Blocks of the cluster before it.
+    pub before: usize,
+    /// The first block.
+    pub first: usize,
+    /// How many.
+    pub count: usize,
+    /// The first row of places.
+    pub row: usize,
+    /// Whether they are strips.
+    pub are_strips: bool,
 }
 
 impl<R> Clone for Part<'_, R> {
@@ -93,20 +135,50 @@ impl<R> Copy for Part<'_, R> {}
 impl<R> Part<'_, R> {
     /// Elements.
     pub fn elements(&self) -> usize {
-        self.elements
+        self.span.extent.elements
     }
 
     /// How many blocks there are.
     pub(crate) fn len(&self) -> usize {
-        self.elements.div_ceil(self.blocks.lanes)
+        self.elements().div_ceil(self.blocks.lanes)
+    }
+
+    /// Its blocks, at most so many at once: of strips whole ones.
+    pub(crate) fn ranges(&self, most: usize) -> impl Iterator<Item = Range> {
+        let (span, len, nodes) = (self.span, self.len(), self.blocks.nodes);
+        let ends = [MEMBERS * span.extent.strips, len];
+        let mut before = 0;
+        std::iter::from_fn(move || {
+            let are_strips = before < ends[0];
+            let count = if are_strips { most.next_multiple_of(MEMBERS) } else { most };
+            let count = count.min(ends[usize::from(!are_strips)] - before);
+            let range = Range { before, first: span.first + before, count, row: span.row(before, nodes), are_strips };
+            before += count;
+            (count > 0).then_some(range)
+        })
     }
 
     /// The nodes of the elements of each block, numbered within the cluster: those of one node of an element after the
     /// other, lane after lane.
     pub fn nodes(&self) -> impl Iterator<Item = Vec<u32>> {
-        let of_block = self.blocks.nodes * self.blocks.lanes;
-        let places = self.blocks.places.all()[self.first * of_block..][..self.len() * of_block].chunks_exact(of_block);
-        places.map(|places| places.iter().map(|place| u32::from(*place) / stride::<R>() as u32).collect())
+        let (lanes, nodes) = (self.blocks.lanes, self.blocks.nodes);
+        let row = move |block: usize, node: usize| match block < MEMBERS * self.span.extent.strips {
+            true => self.span.row(block - block % MEMBERS, nodes) + STRIP[block % MEMBERS][node],
+            false => self.span.row(block, nodes) + node,
+        };
+        let places = move |row: usize| &self.blocks.places.all()[row * lanes..][..lanes];
+        (0..self.len()).map(move |block| {
+            let places = (0..nodes).flat_map(|node| places(row(block, node)));
+            places.map(|place| u32::from(*place) / stride::<R>() as u32).collect()
+        })
+    }
+}
+
+impl Span {
+    /// The first row of places of a block: of strips their first one.
+    fn row(&self, block: usize, nodes: usize) -> usize {
+        let of_strips = block.min(MEMBERS * self.extent.strips);
+        self.row + of_strips / MEMBERS * strip::NODES + (block - of_strips) * nodes
     }
 }
 
@@ -118,12 +190,20 @@ pub const fn most_nodes<R>() -> usize {
 impl<R: Real + Default> Blocks<R> {
     /// Room for clusters of so many elements, in blocks of so many lanes; each element has so many nodes, points and
     /// constants, and maybe constants of its own. [`Blocks::fill`] says what they are.
-    pub fn new(lanes: usize, [nodes, points, constants]: [usize; 3], per_element: bool, clusters: &[usize]) -> Self {
-        let mut count = 0;
-        let part = |elements: &usize| {
-            let first = count;
-            count += elements.div_ceil(lanes);
-            (first, *elements)
+    ///
+    /// # Panics
+    /// There are more strips than elements, or strips of others than linear tetrahedra.
+    pub fn new(lanes: usize, [nodes, points, constants]: [usize; 3], per_element: bool, clusters: &[Extent]) -> Self {
+        let (mut count, mut rows) = (0, 0);
+        let part = |extent: &Extent| {
+            let Extent { elements, strips } = *extent;
+            assert!(strips == 0 || [nodes, points] == [4, 1], "strips are of linear tetrahedra");
+            assert!(MEMBERS * strips * lanes <= elements, "strips beyond the last element");
+            let span = Span { first: count, row: rows, extent: *extent };
+            let blocks = elements.div_ceil(lanes);
+            count += blocks;
+            rows = span.row(blocks, nodes);
+            span
         };
         let parts = clusters.iter().map(part).collect();
         let sets = if per_element { count * lanes } else { 1 };
@@ -131,7 +211,7 @@ impl<R: Real + Default> Blocks<R> {
             lanes,
             nodes,
             points,
-            places: Aligned::zeros(count * nodes * lanes),
+            places: Aligned::zeros(rows * lanes),
             rest: Aligned::zeros(count * points * 10 * lanes),
             constants: Aligned::zeros(sets * constants),
             constant_count: constants,
@@ -144,9 +224,10 @@ impl<R: Real + Default> Blocks<R> {
     /// The elements of a cluster, by its number.
     ///
     /// # Panics
-    /// The arrays do not fit together, or a node is beyond [`most_nodes`].
+    /// The arrays do not fit together, a node is beyond [`most_nodes`], or a strip is none.
     pub fn fill(&mut self, cluster: usize, given: &Cluster<R>) {
-        let (first, elements) = self.parts[cluster];
+        let span = self.parts[cluster];
+        let Span { first, extent: Extent { elements, strips }, .. } = span;
         let (lanes, nodes, points, count) = (self.lanes, self.nodes, self.points, self.constant_count);
         assert_eq!(given.nodes.len(), elements * nodes, "each element has all nodes");
         assert_eq!(given.rest.len(), elements * points, "each element has all points");
@@ -160,10 +241,19 @@ impl<R: Real + Default> Blocks<R> {
         for lane in 0..elements.div_ceil(lanes) * lanes {
             // What fills the last block up is its last element once more.
             let (e, again) = (lane.min(elements - 1), lane >= elements);
-            let (block, lane) = (first + lane / lanes, lane % lanes);
+            let (in_part, lane) = (lane / lanes, lane % lanes);
+            let (block, member) = (first + in_part, in_part % MEMBERS);
             for (node, n) in given.nodes[e * nodes..][..nodes].iter().enumerate() {
-                let place = *n as usize * stride::<R>();
-                self.places.all_mut()[(block * nodes + node) * lanes + lane] = place as Place;
+                let place = (*n as usize * stride::<R>()) as Place;
+                let row = match in_part < MEMBERS * strips {
+                    true => span.row(in_part - member, nodes) + STRIP[member][node],
+                    false => span.row(in_part, nodes) + node,
+                };
+                let at = &mut self.places.all_mut()[row * lanes + lane];
+                let is_met =
+                    in_part < MEMBERS * strips && STRIP[..member].as_flattened().contains(&STRIP[member][node]);
+                assert!(!is_met || *at == place, "elements of a strip share faces");
+                *at = place;
             }
             for (q, point) in given.rest[e * points..][..points].iter().enumerate() {
                 let weight = if again { R::default() } else { point.weight };
@@ -184,8 +274,7 @@ impl<R: Real + Default> Blocks<R> {
 impl<R> Blocks<R> {
     /// The blocks of a cluster.
     pub fn part(&self, cluster: usize) -> Part<'_, R> {
-        let (first, elements) = self.parts[cluster];
-        Part { blocks: self, first, elements }
+        Part { blocks: self, span: self.parts[cluster] }
     }
 
     /// Nodes that vectors have which kernels are given: as many as the cluster with the most, at least.
@@ -195,7 +284,12 @@ impl<R> Blocks<R> {
 
     /// How many blocks there are.
     fn count(&self) -> usize {
-        self.parts.last().map_or(0, |(first, elements)| first + elements.div_ceil(self.lanes))
+        self.parts.last().map_or(0, |span| span.first + span.extent.elements.div_ceil(self.lanes))
+    }
+
+    /// Elements of a block.
+    pub fn lanes(&self) -> usize {
+        self.lanes
     }
 
     /// Nodes of an element.
@@ -218,28 +312,28 @@ impl<R> Blocks<R> {
         self.per_element
     }
 
-    /// The places of a node of each element of a block, which are those of nodes.
+    /// A row of places, which are those of nodes.
     ///
     /// # Panics
-    /// The block has other lanes, or there are fewer nodes than its elements have.
+    /// There are other lanes, or fewer nodes than a cluster has.
     #[inline(always)]
-    fn places<V: Lanes<Scalar = R>>(&self, block: usize, node: usize, nodes: &[Node<R>]) -> &[Place] {
+    fn places<V: Lanes<Scalar = R>>(&self, row: usize, nodes: &[Node<R>]) -> &[Place] {
         assert!(V::COUNT == self.lanes && nodes.len() >= self.reach, "blocks of other lanes or nodes");
-        &self.places.all()[(block * self.nodes + node) * V::COUNT..][..V::COUNT]
+        &self.places.all()[row * V::COUNT..][..V::COUNT]
     }
 
-    /// The vectors at a node of each element of a block.
+    /// The vectors at a row of places.
     #[inline(always)]
-    pub(crate) fn gather<V: Lanes<Scalar = R>>(&self, u: &[Node<R>], block: usize, node: usize) -> [V; 3] {
+    pub(crate) fn gather<V: Lanes<Scalar = R>>(&self, u: &[Node<R>], row: usize) -> [V; 3] {
         // SAFETY: `places` says so.
-        unsafe { V::gather(u, self.places::<V>(block, node, u)) }
+        unsafe { V::gather(u, self.places::<V>(row, u)) }
     }
 
-    /// Adds vectors to a node of each element of a block.
+    /// Adds vectors at a row of places.
     #[inline(always)]
-    pub(crate) fn scatter<V: Lanes<Scalar = R>>(&self, vectors: [V; 3], f: &mut [Node<R>], block: usize, node: usize) {
+    pub(crate) fn scatter<V: Lanes<Scalar = R>>(&self, vectors: [V; 3], f: &mut [Node<R>], row: usize) {
         // SAFETY: as above.
-        unsafe { V::scatter(vectors, f, self.places::<V>(block, node, f)) }
+        unsafe { V::scatter(vectors, f, self.places::<V>(row, f)) }
     }
 }
 
@@ -250,8 +344,12 @@ impl<R: Copy> Blocks<R> {
     pub(crate) fn prefetch(&self, block: usize) {
         let each = 10 * self.points * self.lanes;
         self.rest.prefetch(block * each, each);
-        let each = self.nodes * self.lanes;
-        self.places.prefetch(block * each, each);
+    }
+
+    /// As [`Blocks::prefetch`], some rows of places.
+    #[inline(always)]
+    pub(crate) fn prefetch_places(&self, row: usize, rows: usize) {
+        self.places.prefetch(row * self.lanes, rows * self.lanes);
     }
 
     /// J^-1 at a quadrature point of each element of a block, and the weight.

@@ -4,12 +4,13 @@
 //! two, not the product: G and P stay in the innermost cache.
 
 use crate::assembly::{Pair, pairs};
-use crate::blocks::{Blocks, Part, States};
+use crate::blocks::{Blocks, Part, Range, States};
 use crate::element::{ElementEntry, ElementInfo, ElementKernels, Elements, Table};
 use crate::lanes::{Engine, Lanes, Node, Registers};
 use crate::law::LawEntry;
 use crate::matrix::{MultiplyKernel, Rows};
 use crate::point::{DampingPointKernels, Material, Outside, PointKernels};
+use crate::strip::MEMBERS;
 use crate::table::{Precision, Tabled};
 
 /// Bytes of a tensor at the points that are computed at once, unless one block has more: what of G, dG and P stays in a
@@ -101,7 +102,9 @@ impl<V: Tabled> Composed<V> {
 
     /// Blocks that are computed at once.
     fn group(&self) -> usize {
-        (BYTES / (9 * V::COUNT * size_of::<V::Scalar>() * self.info.points.len())).max(1)
+        let blocks = (BYTES / (9 * V::COUNT * size_of::<V::Scalar>() * self.info.points.len())).max(1);
+        // Whole strips.
+        if self.info.is_linear_simplex { (blocks / MEMBERS).max(1) * MEMBERS } else { blocks }
     }
 
     /// Room for a tensor at each point of a group, and so many more.
@@ -133,15 +136,14 @@ impl<V: Tabled> Composed<V> {
         let (group, count, points) = (self.group(), blocks.constants(), self.info.points.len());
         let sets = if blocks.per_element() { group.min(part.len()) } else { 1 };
         let mut constants = vec![V::from_f64(0.0); sets * count];
-        blocks.load_constants(part.first, &mut constants);
-        for before in (0..part.len()).step_by(group) {
-            let (first, here) = (part.first + before, group.min(part.len() - before));
-            if blocks.per_element() && before > 0 {
-                blocks.load_constants(first, &mut constants[..here * count]);
+        let stride = if blocks.per_element() { count } else { 0 };
+        for Range { before, first, count: here, row, are_strips } in part.ranges(group) {
+            if blocks.per_element() || before == 0 {
+                blocks.load_constants(first, &mut constants[..here.min(sets) * count]);
             }
-            let stride = if blocks.per_element() { count } else { 0 };
             let material = Material { constants: &constants, stride, count, points };
-            call(before * V::COUNT, Elements { blocks, first, count: here, table: &self.table }, material);
+            let table = &self.table;
+            call(before * V::COUNT, Elements { blocks, first, count: here, row, are_strips, table }, material);
         }
     }
 

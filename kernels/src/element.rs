@@ -9,6 +9,7 @@ use crate::blocks::Blocks;
 use crate::lanes::{Lanes, Node};
 use crate::real::Real;
 use crate::shader::ElementFunctions;
+use crate::strip::{self, MEMBERS, STRIP};
 use crate::table::ElementTable;
 
 /// An element, as its file declares it.
@@ -161,7 +162,7 @@ impl<V: Real> Table<V> {
     }
 
     #[inline(always)]
-    fn point(&self, q: usize) -> &[V] {
+    pub(crate) fn point(&self, q: usize) -> &[V] {
         let len = self.slopes.len() / self.points;
         &self.slopes[q * len..][..len]
     }
@@ -176,8 +177,45 @@ pub struct Elements<'a, V: Lanes> {
     pub(crate) first: usize,
     /// How many blocks.
     pub(crate) count: usize,
+    /// The first row of their places.
+    pub(crate) row: usize,
+    /// Whether each three blocks are strips.
+    pub(crate) are_strips: bool,
     /// The element's table.
     pub(crate) table: &'a Table<V>,
+}
+
+impl<V: Lanes> Elements<'_, V> {
+    /// The row of places of a node of a block's elements.
+    #[inline(always)]
+    fn row(&self, block: usize, node: usize) -> usize {
+        match self.are_strips {
+            true => self.strip_row(block) + STRIP[block % MEMBERS][node],
+            false => self.row + block * self.blocks.nodes() + node,
+        }
+    }
+
+    /// The first row of places of the strips that a block is of.
+    #[inline(always)]
+    pub(crate) fn strip_row(&self, block: usize) -> usize {
+        self.row + block / MEMBERS * strip::NODES
+    }
+
+    /// Asks for what a block of the next range has at rest.
+    #[inline(always)]
+    pub(crate) fn prefetch_rest(&self, block: usize) {
+        self.blocks.prefetch(self.first + self.count + block);
+    }
+
+    /// Asks for the places of a block of the next range.
+    #[inline(always)]
+    pub(crate) fn prefetch_places(&self, block: usize) {
+        let next = self.count + block;
+        match self.are_strips {
+            true => self.blocks.prefetch_places(self.strip_row(next), strip::NODES),
+            false => self.blocks.prefetch_places(self.row(next, 0), self.blocks.nodes()),
+        }
+    }
 }
 
 /// Nodal vectors, N of them -> their gradients at each quadrature point.
@@ -258,15 +296,19 @@ fn gradients_of<E: Element, V: Lanes, const N: usize>(
     vectors: [&[Node<V::Scalar>]; N],
     mut out: [&mut [[V; 9]]; N],
 ) {
+    if elements.are_strips && E::info().is_linear_simplex {
+        return strip::gradients_of::<E, V, N>(elements, vectors, &mut out);
+    }
     let points = E::info().points.len();
-    let Elements { blocks, first, count, table } = *elements;
+    let Elements { blocks, first, count, table, .. } = *elements;
     for block in 0..count {
-        blocks.prefetch(first + count + block);
+        elements.prefetch_rest(block);
+        elements.prefetch_places(block);
         // One vector after the other: of two at once there are more numbers than registers.
         for (vector, out) in vectors.iter().zip(&mut out) {
             let mut nodal = E::nodal();
             for (node, vector_at_node) in nodal.as_mut().iter_mut().enumerate() {
-                *vector_at_node = blocks.gather(vector, first + block, node);
+                *vector_at_node = blocks.gather(vector, elements.row(block, node));
             }
             for q in 0..points {
                 let (inverse_jacobian, _) = blocks.rest::<V>(first + block, q);
@@ -279,8 +321,11 @@ fn gradients_of<E: Element, V: Lanes, const N: usize>(
 /// See [`ContractKernel`].
 #[inline(always)]
 pub(crate) fn contract<E: Element, V: Lanes>(elements: &Elements<V>, stress: &[[V; 9]], f: &mut [Node<V::Scalar>]) {
+    if elements.are_strips && E::info().is_linear_simplex {
+        return strip::contract::<E, V>(elements, stress, f);
+    }
     let points = E::info().points.len();
-    let Elements { blocks, first, count, table } = *elements;
+    let Elements { blocks, first, count, table, .. } = *elements;
     for block in 0..count {
         let mut forces = E::nodal();
         for q in 0..points {
@@ -289,7 +334,7 @@ pub(crate) fn contract<E: Element, V: Lanes>(elements: &Elements<V>, stress: &[[
             E::contract(stress, table.point(q), &inverse_jacobian, weight, &mut forces);
         }
         for (node, force) in forces.as_ref().iter().enumerate() {
-            blocks.scatter(*force, f, first + block, node);
+            blocks.scatter(*force, f, elements.row(block, node));
         }
     }
 }
@@ -299,7 +344,7 @@ pub(crate) fn contract<E: Element, V: Lanes>(elements: &Elements<V>, stress: &[[
 pub(crate) fn node_gradients<E: Element, V: Lanes>(elements: &Elements<V>, out: &mut [[V; 3]]) {
     let info = E::info();
     let points = info.points.len();
-    let Elements { blocks, first, count, table } = *elements;
+    let Elements { blocks, first, count, table, .. } = *elements;
     for (k, out) in out.chunks_exact_mut(info.nodes).take(count * points).enumerate() {
         let (inverse_jacobian, _) = blocks.rest::<V>(first + k / points, k % points);
         out.copy_from_slice(E::node_gradients(table.point(k % points), &inverse_jacobian).as_ref());
@@ -321,7 +366,7 @@ pub(crate) fn integrate_nodes<V: Lanes>(elements: &Elements<V>, at_points: &[[V;
                     sum[i] = sum[i] + value[i] * weight;
                 }
             }
-            blocks.scatter(sum, f, first + block, node);
+            blocks.scatter(sum, f, elements.row(block, node));
         }
     }
 }

@@ -20,10 +20,11 @@ mod matrix;
 pub mod point;
 mod real;
 pub mod shader;
+pub mod strip;
 mod table;
 
 pub use assembly::{Pair, block_place, pairs};
-pub use blocks::{Blocks, Cluster, Part, States, most_nodes};
+pub use blocks::{Blocks, Cluster, Extent, Part, States, most_nodes};
 pub use composed::{Compute, compose};
 pub use damping::{DampingEntry, Dissipative};
 pub use element::{Element, ElementEntry, ElementInfo, Face, Numbering, ReferencePoint, RestPoint, Term};

@@ -30,6 +30,7 @@ pub mod scale;
 pub mod scene;
 pub mod simulate;
 pub mod step_limit;
+pub mod strips;
 pub mod system;
 pub mod tangent;
 pub mod target;

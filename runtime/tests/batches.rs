@@ -217,8 +217,12 @@ fn forces(model: &Model, u: &[[f64; 3]]) -> (Vec<[f64; 3]>, Vec<f64>, Vec<[f64; 
     )
 }
 
-/// Slabs of different laws, or of one law with different stiffness: each element has, to the bit, what it has in a body
-/// that is made of its material alone (units change by powers of two only), and each node the sum of that.
+/// Roundings in a kernel's longest chain of operations, magnified by what cancels at these strains: elements that are in
+/// other strips take differences to other nodes.
+const ROUNDINGS: f64 = 200.0;
+
+/// Slabs of different laws, or of one law with different stiffness: each element has what it has in a body that is made of
+/// its material alone (units change by powers of two only), and each node the sum of that.
 fn check_slabs(slabs: &[(&str, f64)]) {
     let text = |slabs: &[(&str, f64)]| {
         let (materials, solver) =
@@ -241,8 +245,13 @@ fn check_slabs(slabs: &[(&str, f64)]) {
             let x = corners.iter().map(|p| p[0]).sum::<f64>() / 4.0;
             if (x / 4.0 * slabs.len() as f64) as usize == i {
                 let name = format!("{slabs:?}, seed {seed}, element {e:?} of slab {i}");
-                assert_eq!(energies[e.index()].to_bits(), own_energies[e.index()].to_bits(), "{name}");
-                assert_eq!(stresses[e.index()].map(f64::to_bits), own_stresses[e.index()].map(f64::to_bits), "{name}");
+                let near = |found: &[f64], wanted: &[f64]| {
+                    let size = wanted.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
+                    let off = found.iter().zip(wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                    assert!(off <= ROUNDINGS * f64::EPSILON * size, "{name}: {found:?} against {wanted:?}");
+                };
+                near(&energies[e.index()..=e.index()], &own_energies[e.index()..=e.index()]);
+                near(&stresses[e.index()], &own_stresses[e.index()]);
             }
         }
         // The forces of this slab: a body of its elements' batch only.

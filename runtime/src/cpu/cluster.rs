@@ -5,11 +5,13 @@
 
 use std::ops::Range;
 
-use tensormass_kernels::{Blocks, Cluster as Elements, Compute, Node, RestPoint};
+use tensormass_kernels::strip::MEMBERS;
+use tensormass_kernels::{Blocks, Cluster as Elements, Extent, Node, RestPoint};
 
 use super::Precision;
 use super::vectors::CpuVector;
 use crate::body::{Body, LawBatch};
+use crate::strips::{Member, strips};
 
 /// Elements of one law and kind that are near each other.
 pub(super) struct Cluster {
@@ -22,18 +24,16 @@ pub(super) struct Cluster {
 }
 
 impl Cluster {
-    /// Some elements of a batch, by their places in it: those of a cluster of `blocks`, which are filled. The first nodes,
-    /// so many, are those of clusters before.
+    /// Some elements of a batch: those of a cluster of `blocks`, which are filled. The first nodes, so many, are those of
+    /// clusters before.
     pub fn new<R: Precision>(
         (body, batch, places): (&Body, &LawBatch, &[u32]),
-        range: Range<usize>,
+        arranged: &Arranged,
         met: usize,
         (blocks, number): (&mut Blocks<R>, usize),
-        compute: &dyn Compute<R>,
     ) -> Self {
         let count = batch.law.info.constants.len();
-        let order = interleaved(range, compute.lanes());
-        let elements: Vec<u32> = order.iter().map(|e| batch.elements[*e]).collect();
+        let elements: Vec<u32> = arranged.members.iter().map(|m| batch.elements[m.element as usize]).collect();
         let nodes = |e: &u32| body.elements[*e as usize].iter().map(|n| places[*n as usize]);
         let mut all: Vec<u32> = elements.iter().flat_map(nodes).collect();
         all.sort_unstable();
@@ -41,16 +41,26 @@ impl Cluster {
         let foreign: Vec<u32> = all[..all.partition_point(|n| (*n as usize) < met)].to_vec();
         let own = met..met + all.len() - foreign.len();
         let cluster = Self { elements, own, foreign };
-        let nodes: Vec<u32> = cluster.elements.iter().flat_map(nodes).map(|n| cluster.local(n)).collect();
-        let round = |x: f64| R::from_f64(x);
-        let rest = cluster.elements.iter().flat_map(|e| &body.rest[*e as usize]);
-        let rest: Vec<RestPoint<R>> = rest
-            .map(|r| RestPoint { inverse_jacobian: r.inverse_jacobian.map(round), weight: round(r.weight) })
-            .collect();
-        let constants: Vec<R> = match batch.per_element {
-            true => order.iter().flat_map(|e| &batch.constants[e * count..][..count]).map(|c| round(*c)).collect(),
-            false => batch.constants.iter().map(|c| round(*c)).collect(),
-        };
+        let strips = arranged.extent.strips * MEMBERS * blocks.lanes();
+        let (mut nodes, mut rest, mut constants) = (vec![], vec![], vec![]);
+        for (k, (e, member)) in cluster.elements.iter().zip(&arranged.members).enumerate() {
+            let (of_element, points) = (&body.elements[*e as usize], &body.rest[*e as usize]);
+            let node = |n: usize| cluster.local(places[of_element[n] as usize]);
+            match k < strips {
+                true => nodes.extend(member.order.map(|n| node(usize::from(n)))),
+                false => nodes.extend((0..of_element.len()).map(node)),
+            }
+            let rounded = |point: RestPoint<f64>| RestPoint {
+                inverse_jacobian: point.inverse_jacobian.map(R::from_f64),
+                weight: R::from_f64(point.weight),
+            };
+            rest.extend(points.iter().map(|p| rounded(if k < strips { reordered(p, member.order) } else { *p })));
+            if batch.per_element {
+                constants.extend(batch.constants[member.element as usize * count..][..count].iter().copied());
+            }
+        }
+        let constants = if batch.per_element { &constants } else { &batch.constants };
+        let constants: Vec<R> = constants.iter().map(|c| R::from_f64(*c)).collect();
         blocks.fill(number, &Elements { nodes: &nodes, rest: &rest, constants: &constants });
         cluster
     }
@@ -139,10 +149,62 @@ fn four<R: Copy>(numbers: &[R], node: usize, to: &mut Node<R>) {
     }
 }
 
-/// A range in which places that follow each other are far apart in whole blocks: the elements of a block share no nodes, as
+/// The elements of a cluster in the order of its blocks.
+pub(super) struct Arranged {
+    /// Places in the batch; of strips, which come first, with the order of the nodes.
+    members: Vec<Member>,
+    /// How many.
+    pub extent: Extent,
+}
+
+impl Arranged {
+    /// A range of a batch, as strips on so many lanes as far as they fill blocks.
+    pub fn new(body: &Body, batch: &LawBatch, range: Range<usize>, lanes: usize) -> Self {
+        let alone = |element: u32| Member { element, order: [0, 1, 2, 3] };
+        let in_batch = |member: Member| Member { element: range.start as u32 + member.element, ..member };
+        let mut found = vec![];
+        if batch.element.info.is_linear_simplex {
+            let nodes = |e: &u32| body.elements[*e as usize].try_into().expect("a tetrahedron has four nodes");
+            let elements: Vec<[u32; 4]> = batch.elements[range.clone()].iter().map(nodes).collect();
+            (found, _) = strips(&elements);
+            found.sort_unstable_by_key(|strip| strip.each_ref().map(|m| m.element).into_iter().min());
+        }
+        let blocks = found.len() / lanes;
+        let mut is_alone = vec![true; range.len()];
+        let mut members = vec![];
+        for block in 0..blocks {
+            for m in 0..MEMBERS {
+                // What is in neighbouring lanes is far apart.
+                members.extend((0..lanes).map(|lane| found[lane * blocks + block][m]));
+            }
+        }
+        members.iter().for_each(|m| is_alone[m.element as usize] = false);
+        let others: Vec<u32> = (0..range.len() as u32).filter(|e| is_alone[*e as usize]).collect();
+        members.extend(interleaved(others.len(), lanes).map(|k| alone(others[k])));
+        let extent = Extent { elements: range.len(), strips: blocks };
+        Self { members: members.into_iter().map(in_batch).collect(), extent }
+    }
+}
+
+/// Places so that those that follow each other are far apart in whole blocks: the elements of a block share no nodes, as
 /// far as can be, and one addition to a node need not wait for another.
-fn interleaved(range: Range<usize>, lanes: usize) -> Vec<usize> {
-    let blocks = range.len() / lanes;
-    let whole = (0..blocks * lanes).map(|k| range.start + k % lanes * blocks + k / lanes);
-    whole.chain(range.start + blocks * lanes..range.end).collect()
+fn interleaved(count: usize, lanes: usize) -> impl Iterator<Item = usize> {
+    let blocks = count / lanes;
+    let whole = (0..blocks * lanes).map(move |k| k % lanes * blocks + k / lanes);
+    whole.chain(blocks * lanes..count)
+}
+
+/// A linear tetrahedron at rest, with its nodes in another order.
+fn reordered(point: &RestPoint<f64>, order: [u8; 4]) -> RestPoint<f64> {
+    let rows = point.inverse_jacobian.as_chunks::<3>().0;
+    // The gradients of nodes 1, 2, 3; with that of node 0 they sum to zero.
+    let gradient = |n: u8| match n {
+        0 => std::array::from_fn(|k| -(rows[0][k] + rows[1][k] + rows[2][k])),
+        n => rows[usize::from(n) - 1],
+    };
+    let mut inverse_jacobian = [0.0; 9];
+    for (row, n) in inverse_jacobian.as_chunks_mut::<3>().0.iter_mut().zip(&order[1..]) {
+        *row = gradient(*n);
+    }
+    RestPoint { inverse_jacobian, weight: point.weight }
 }

@@ -9,10 +9,10 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
-use tensormass_kernels::{Blocks, Compute, Engine, LawInfo, Node, Part, States, compose};
+use tensormass_kernels::{Blocks, Compute, Engine, Extent, LawInfo, Node, Part, States, compose};
 
 use super::assembled::Assembled;
-use super::cluster::{Cluster, Room, Vectors};
+use super::cluster::{Arranged, Cluster, Room, Vectors};
 use super::vectors::{BLOCK, CpuVector, exact_dot};
 use super::{CpuBackend, Precision};
 use crate::backend::{Backend, ForceField, LeftDomain, Operator, REGISTERS, RUNNING, SUM};
@@ -55,17 +55,19 @@ impl<R: Precision> CpuBatch<R> {
         let compute = compose::<R>(engine, batch.element, batch.law);
         let (count, size) = (batch.elements.len(), cluster_size(info.nodes, batch.elements.len()));
         let ranges: Vec<_> = (0..count).step_by(size).map(|start| start..count.min(start + size)).collect();
-        let lens: Vec<usize> = ranges.iter().map(ExactSizeIterator::len).collect();
+        let arranged: Vec<Arranged> =
+            ranges.into_par_iter().map(|range| Arranged::new(body, batch, range, compute.lanes())).collect();
+        let extents: Vec<Extent> = arranged.iter().map(|a| a.extent).collect();
         let shape = [info.nodes, info.points.len(), batch.law.info.constants.len()];
-        let mut blocks = Blocks::new(compute.lanes(), shape, batch.per_element, &lens);
-        let cluster = |(number, range)| {
-            let cluster = Cluster::new((body, batch, places), range, *met, (&mut blocks, number), &*compute);
+        let mut blocks = Blocks::new(compute.lanes(), shape, batch.per_element, &extents);
+        let cluster = |(number, arranged)| {
+            let cluster = Cluster::new((body, batch, places), arranged, *met, (&mut blocks, number));
             *met = cluster.own.end;
             cluster
         };
         Self {
             law: batch.law.info,
-            clusters: ranges.into_iter().enumerate().map(cluster).collect(),
+            clusters: arranged.iter().enumerate().map(cluster).collect(),
             blocks,
             compute,
             products: Products::Stored(None),

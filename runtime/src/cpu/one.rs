@@ -1,6 +1,6 @@
 //! A law on one element, in double precision: what step limits and tests ask of it.
 
-use tensormass_kernels::{Blocks, Cluster, Compute, ElementEntry, Engine, LawEntry, Node, RestPoint, compose};
+use tensormass_kernels::{Blocks, Cluster, Compute, ElementEntry, Engine, Extent, LawEntry, Node, RestPoint, compose};
 
 /// One element with its kernels; vectors are given at its nodes.
 pub struct One {
@@ -21,7 +21,7 @@ impl One {
         let nodes: Vec<u32> = (0..element.info.nodes as u32).collect();
         let compute = compose::<f64>(Engine::SCALAR, element, law);
         let shape = [element.info.nodes, element.info.points.len(), law.info.constants.len()];
-        let mut blocks = Blocks::new(compute.lanes(), shape, false, &[1]);
+        let mut blocks = Blocks::new(compute.lanes(), shape, false, &[Extent::of(1)]);
         blocks.fill(0, &Cluster { nodes: &nodes, rest, constants });
         Self { blocks, compute }
     }
