@@ -7,7 +7,7 @@
 
 use std::collections::HashSet;
 
-use tensormass_kernels::shader::{PASSES, element_pass, node_product, node_sum};
+use tensormass_kernels::shader::{PASSES, Unit, element_pass, node_product, node_sum};
 use tensormass_kernels::{ElementEntry, LawEntry, element, laws, linear_tetrahedron};
 use tensormass_testing::codegen::derivation::{Derivation, Tangent};
 use tensormass_testing::codegen::element::{ElementKernels, kernels, tetrahedron_p1};
@@ -44,10 +44,10 @@ fn check(name: &str, text: &str) {
 }
 
 /// The passes of a law on an element for review: of each, the parts between empty lines that no earlier one has.
-fn passes(law: &LawEntry, element: &ElementEntry) -> String {
+fn passes(law: &LawEntry, element: &ElementEntry, unit: Unit) -> String {
     let mut shown = HashSet::new();
     let mut out = String::new();
-    for (pass, shader) in PASSES.iter().filter_map(|pass| Some((pass, element_pass(law, element, *pass)?))) {
+    for (pass, shader) in PASSES.iter().filter_map(|pass| Some((pass, element_pass(law, element, *pass, unit)?))) {
         out += &format!("// ---- {pass:?}: binds {:?}\n\n", shader.bindings);
         for part in shader.text.split("\n\n").filter(|part| shown.insert(part.to_string())) {
             out += &format!("{}\n\n", part.trim_end());
@@ -70,7 +70,7 @@ fn each_reviewed_law() {
         let law = law::parse(&path, &text).expect("the build accepted it");
         let derivation = derivation(env!("TENSORMASS_GENERATED"), name);
         check(&format!("law_{name}"), &rust::format(rust::law_module(&law, &derivation, true)).expect("Rust"));
-        check(&format!("wgsl_{name}"), &passes(entry, linear_tetrahedron()));
+        check(&format!("wgsl_{name}"), &passes(entry, linear_tetrahedron(), Unit::Element));
     }
     eprintln!("skipped {unreviewed} unreviewed laws");
 }
@@ -93,7 +93,14 @@ fn node_passes() {
 #[test]
 fn passes_over_points() {
     let element = element("quadrangle_q1").expect("a shipped element");
-    check("wgsl_quadrangle_q1", &passes(&laws()[laws().len() / 2], element));
+    check("wgsl_quadrangle_q1", &passes(&laws()[laws().len() / 2], element, Unit::Element));
+}
+
+/// Passes over strips, whatever the law.
+#[test]
+fn passes_over_strips() {
+    let law = tensormass_kernels::law("hooke").expect("a shipped law");
+    check("wgsl_strip_hooke", &passes(law, linear_tetrahedron(), Unit::Strip));
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! The generated WGSL: every law and pass is valid, within every device's limits, and binds what its `Shader` says.
 
 use tensormass_kernels::shader::{
-    Argument, Binding, DampingFunctions, PASSES, Pass, PointFunction, Shader, element_pass, node_product, node_sum,
+    Argument, Binding, DampingFunctions, PASSES, Pass, PointFunction, Shader, Unit, element_pass, node_product,
+    node_sum,
 };
-use tensormass_kernels::{elements, laws};
+use tensormass_kernels::{ElementEntry, elements, laws};
 use tensormass_testing::codegen::print::wgsl::is_free;
 use tensormass_testing::wgsl;
 
@@ -44,14 +45,20 @@ fn check(what: &str, shader: &Shader) {
     assert!(bound[0].uniform && bound[1..].iter().all(|b| !b.uniform), "{what}: the uniform is binding 0");
 }
 
+/// What invocations of passes of an element compute.
+fn units(element: &ElementEntry) -> &'static [Unit] {
+    if element.info.is_linear_simplex { &[Unit::Element, Unit::Strip] } else { &[Unit::Element] }
+}
+
 /// Elements of which bodies can be made: faces have no strain.
 #[test]
 fn passes_of_every_law_on_every_element() {
     for law in laws() {
         for element in elements().iter().filter(|e| e.info.dimension > 1) {
-            for pass in PASSES {
-                let Some(shader) = element_pass(law, element, pass) else { continue };
-                let what = format!("{}, {}, {pass:?}", law.info.name, element.info.name);
+            for (pass, unit) in PASSES.into_iter().flat_map(|pass| units(element).iter().map(move |unit| (pass, *unit)))
+            {
+                let Some(shader) = element_pass(law, element, pass, unit) else { continue };
+                let what = format!("{}, {}, {pass:?}, {unit:?}", law.info.name, element.info.name);
                 check(&what, &shader);
                 for name in declared(&shader.text) {
                     assert!(!is_free(name), "{what}: a value could be named like `{name}`");
@@ -80,10 +87,12 @@ fn damping_that_reads_everything() {
     with.functions = functions;
     law.damping = Some(with);
     for element in elements().iter().filter(|e| e.info.dimension > 1) {
-        let shader = element_pass(&law, element, Pass::DDamping).expect("the law has a dissipation");
-        check(&format!("damping that reads everything, {}", element.info.name), &shader);
-        assert_eq!(shader.bindings.len(), 9, "a uniform and eight buffers");
-        assert!(shader.bindings.contains(&Binding::Gate));
+        for unit in units(element) {
+            let shader = element_pass(&law, element, Pass::DDamping, *unit).expect("the law has a dissipation");
+            check(&format!("damping that reads everything, {}, {unit:?}", element.info.name), &shader);
+            assert_eq!(shader.bindings.len(), 9, "a uniform and eight buffers");
+            assert!(shader.bindings.contains(&Binding::Gate));
+        }
     }
 }
 

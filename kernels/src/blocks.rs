@@ -59,6 +59,12 @@ impl Extent {
     pub fn of(elements: usize) -> Self {
         Self { elements, strips: 0 }
     }
+
+    /// Places of nodes that its elements have in blocks of so many lanes, where each has so many nodes.
+    pub fn places(self, lanes: usize, nodes: usize) -> usize {
+        let blocks = self.elements.div_ceil(lanes) - MEMBERS * self.strips;
+        (strip::NODES * self.strips + nodes * blocks) * lanes
+    }
 }
 
 /// Elements of a cluster, as a runtime has them. Of blocks of strips the first elements come first, of one lane after the
@@ -200,9 +206,8 @@ impl<R: Real + Default> Blocks<R> {
             assert!(strips == 0 || [nodes, points] == [4, 1], "strips are of linear tetrahedra");
             assert!(MEMBERS * strips * lanes <= elements, "strips beyond the last element");
             let span = Span { first: count, row: rows, extent: *extent };
-            let blocks = elements.div_ceil(lanes);
-            count += blocks;
-            rows = span.row(blocks, nodes);
+            count += elements.div_ceil(lanes);
+            rows += extent.places(lanes, nodes) / lanes;
             span
         };
         let parts = clusters.iter().map(part).collect();

@@ -28,7 +28,7 @@ pub use blocks::{Blocks, Cluster, Extent, Part, States, most_nodes};
 pub use composed::{Compute, compose};
 pub use damping::{DampingEntry, Dissipative};
 pub use element::{Element, ElementEntry, ElementInfo, Face, Numbering, ReferencePoint, RestPoint, Term};
-pub use lanes::{Chains, Engine, Lanes, Node};
+pub use lanes::{Chains, Engine, Lanes, Node, Place};
 pub use law::{Acceptance, Law, LawEntry, LawInfo, LawSource, Operations, ParameterInfo, Structure};
 pub use matrix::{Matrix, Rows};
 pub use real::Real;

@@ -3,9 +3,14 @@
 //! Recursive coordinate bisection (Berger & Bokhari 1987): elements are halved by their centres along the longest side of
 //! the box around them, until what is left is a cluster. The order depends on nothing but the mesh.
 
+use std::ops::Range;
+
+use rayon::prelude::*;
 use tensormass_kernels::pairs;
+use tensormass_kernels::strip::{self, MEMBERS};
 
 use crate::body::{Body, Constraint, LawBatch};
+use crate::strips::{Member, strips};
 
 /// Nodes that the elements of a cluster name, each as often as it is named: so many vectors stay in the innermost cache.
 const NAMED: usize = 4096;
@@ -20,6 +25,12 @@ const BLOCK: usize = 16;
 pub fn cluster_size(nodes: usize, elements: usize) -> usize {
     let most = (NAMED / nodes).next_multiple_of(BLOCK);
     elements.div_ceil(CLUSTERS).next_multiple_of(BLOCK).clamp(LEAST.min(most), most)
+}
+
+/// The clusters of so many elements of a kind with so many nodes.
+pub fn clusters(nodes: usize, elements: usize) -> Vec<Range<usize>> {
+    let size = cluster_size(nodes, elements);
+    (0..elements).step_by(size).map(|start| start..elements.min(start + size)).collect()
 }
 
 /// Sorts elements, the numbers of their centres, into clusters of so many.
@@ -123,11 +134,58 @@ pub fn placed_constraints(body: &Body, places: &[u32]) -> Vec<Constraint> {
     constraints
 }
 
+/// Elements of a batch, by their places in it.
+#[derive(Debug, Clone)]
+pub struct Grouped {
+    /// Three linear tetrahedra in a row.
+    pub strips: Vec<[Member; MEMBERS]>,
+    /// The others.
+    pub alone: Vec<u32>,
+}
+
+/// Elements among which strips are looked for: they stay near each other.
+const GROUP: usize = 4096;
+/// Strips of a batch for which a pass of their own is worth it, at least.
+const STRIPS: usize = 256;
+
+impl Grouped {
+    /// Partial forces of elements with so many nodes.
+    pub fn slots(&self, nodes: usize) -> usize {
+        strip::NODES * self.strips.len() + nodes * self.alone.len()
+    }
+
+    /// Vectors of four numbers that their nodes take.
+    pub fn fours(&self, nodes: usize) -> usize {
+        strip::NODES.div_ceil(4) * self.strips.len() + nodes.div_ceil(4) * self.alone.len()
+    }
+
+    /// Elements of a batch, in an order that is kept.
+    fn of(body: &Body, batch: &LawBatch, places: Vec<u32>) -> Self {
+        if !batch.element.info.is_linear_simplex {
+            return Self { strips: vec![], alone: places };
+        }
+        let group = |(k, group): (usize, &[u32])| {
+            let nodes = |place: &u32| body.elements[batch.elements[*place as usize] as usize].try_into();
+            let nodes = |place: &u32| nodes(place).expect("a tetrahedron has four nodes");
+            let (mut found, alone) = strips(&group.iter().map(nodes).collect::<Vec<_>>());
+            found.sort_unstable_by_key(|strip| strip.each_ref().map(|m| m.element).into_iter().min());
+            let placed = |m: Member| Member { element: places[k * GROUP + m.element as usize], ..m };
+            let alone: Vec<u32> = alone.iter().map(|e| group[*e as usize]).collect();
+            (found.into_iter().map(|strip| strip.map(placed)).collect::<Vec<_>>(), alone)
+        };
+        let (found, alone): (Vec<_>, Vec<_>) = places.par_chunks(GROUP).enumerate().map(group).unzip();
+        match found.concat() {
+            strips if strips.len() >= STRIPS => Self { strips, alone: alone.concat() },
+            _ => Self { strips: vec![], alone: places },
+        }
+    }
+}
+
 /// An order of a body's elements and nodes for devices without clusters.
 #[derive(Debug, Clone)]
 pub struct DeviceOrder {
-    /// Of each batch, places of its elements in the batch, in the order in which they are computed.
-    pub elements: Vec<Vec<u32>>,
+    /// Of each batch its elements, in the order in which they are computed.
+    pub elements: Vec<Grouped>,
     /// The place of each node in vectors.
     pub places: Vec<u32>,
 }
@@ -152,7 +210,7 @@ impl DeviceOrder {
             if sweeps {
                 places.sort_unstable_by_key(|place| batch.elements[*place as usize]);
             }
-            places
+            Grouped::of(body, batch, places)
         };
         let places = if sweeps { (0..body.masses.len() as u32).collect() } else { node_places(body) };
         Self { elements: body.batches.iter().map(of_batch).collect(), places }

@@ -4,9 +4,10 @@ use serde_json::{Value, json};
 use tensormass_kernels::{ElementInfo, LawEntry, LawInfo, pairs};
 
 use crate::body::LawBatch;
+use crate::cpu::place_bytes;
 use crate::mesh::Quality;
 use crate::model::Model;
-use crate::order::{Sharing, blocks_of_clusters, sharing};
+use crate::order::{DeviceOrder, Sharing, blocks_of_clusters, sharing};
 use crate::scene::{Integrator, Precision, Scene};
 use crate::tangent::{self, Tangent, blocks};
 
@@ -106,9 +107,8 @@ impl Plan {
             })
             .collect();
         let (nodes, elements) = (model.body.masses.len(), model.body.elements.len());
-        let (slots, points) = (model.body.elements.values().len(), model.body.rest.values().len());
-        // A GPU has nodes four by four, and slopes of reference elements with each law and kind.
-        let fours: usize = model.body.batches.iter().map(|b| b.elements.len() * b.element.info.nodes.div_ceil(4)).sum();
+        let points = model.body.rest.values().len();
+        // A GPU has slopes of reference elements with each law and kind.
         let mapped = model.body.batches.iter().map(|b| b.element.info).filter(|info| !info.is_linear_simplex);
         let slopes: usize = mapped.map(|info| info.points.len() * (info.nodes - 1)).sum();
         let matrix = model.body.mass_matrix.as_ref();
@@ -120,6 +120,11 @@ impl Plan {
         let buffers = match layout {
             Layout::Cpu => {
                 let real = scene.solver.precision.bytes();
+                let place_bytes = match scene.solver.precision {
+                    Precision::F32 => place_bytes::<f32>,
+                    Precision::F64 => place_bytes::<f64>,
+                };
+                let of_places = model.body.batches.iter().map(|b| place_bytes(&model.body, b)).sum();
                 // Each node has a partial force, and one for each cluster to which it is foreign; a number both ways, and
                 // where the numbers of a shared node are.
                 let Sharing { foreign, shared } = sharing(&model.body);
@@ -137,7 +142,7 @@ impl Plan {
                 };
                 let assembled = assembled.map(|(b, _)| matrix(b)).sum();
                 vec![
-                    ("element nodes", 2 * slots),
+                    ("element nodes", of_places),
                     ("rest data", 10 * real * points),
                     ("material constants", real * constants),
                     ("partial forces", 3 * real * (nodes + foreign)),
@@ -148,16 +153,22 @@ impl Plan {
                     ("consistent mass", (4 + real) * entries + 4 * rows),
                 ]
             }
-            Layout::Gpu => vec![
-                ("element nodes", 16 * fours),
-                ("rest data", 48 * points + 16 * slopes),
-                ("material constants", 4 * constants),
-                ("partial forces", 16 * slots),
-                ("slots of nodes", 4 * (slots + nodes + 1)),
-                ("margins of domains", 4 * margins),
-                ("state and work vectors", (vectors + 1) * 16 * nodes),
-                ("consistent mass", 8 * entries + 4 * rows),
-            ],
+            Layout::Gpu => {
+                let order = DeviceOrder::of(&model.body);
+                let groups = || model.body.batches.iter().map(|b| b.element.info.nodes).zip(&order.elements);
+                let fours: usize = groups().map(|(nodes, elements)| elements.fours(nodes)).sum();
+                let slots: usize = groups().map(|(nodes, elements)| elements.slots(nodes)).sum();
+                vec![
+                    ("element nodes", 16 * fours),
+                    ("rest data", 48 * points + 16 * slopes),
+                    ("material constants", 4 * constants),
+                    ("partial forces", 16 * slots),
+                    ("slots of nodes", 4 * (slots + nodes + 1)),
+                    ("margins of domains", 4 * margins),
+                    ("state and work vectors", (vectors + 1) * 16 * nodes),
+                    ("consistent mass", 8 * entries + 4 * rows),
+                ]
+            }
         };
         let buffers = buffers.into_iter().filter(|(_, bytes)| *bytes > 0).collect();
         let mut passes = vec!["elements: partial forces", "nodes: sum of slots"];

@@ -3,6 +3,7 @@
 //! Elements are vertices of a graph whose edges are shared faces, and strips are disjoint paths of three. To find as many as
 //! there are is hard; here the element with the fewest free neighbours is served first, as in greedy matchings.
 
+use tensormass_kernels::RestPoint;
 use tensormass_kernels::strip::{MEMBERS, STRIP};
 
 /// Faces of a tetrahedron, each without one of its nodes.
@@ -15,6 +16,38 @@ pub struct Member {
     pub element: u32,
     /// Of each node in the order of strips its number in the element.
     pub order: [u8; 4],
+}
+
+impl Member {
+    /// The same element among those that begin after so many others.
+    pub fn after(self, before: usize) -> Self {
+        Self { element: before as u32 + self.element, ..self }
+    }
+
+    /// The order of its nodes along the strip, of which it is in this place: each element has all but the first node of the
+    /// one before, and one more.
+    pub fn along(&self, place: usize) -> [u8; 4] {
+        let mut along = self.order;
+        for (order, number) in self.order.iter().zip(STRIP[place]) {
+            along[number - place] = *order;
+        }
+        along
+    }
+}
+
+/// A linear tetrahedron at rest, with its nodes in another order.
+pub fn reordered(point: &RestPoint<f64>, order: [u8; 4]) -> RestPoint<f64> {
+    let rows = point.inverse_jacobian.as_chunks::<3>().0;
+    // The gradients of nodes 1, 2, 3; with that of node 0 they sum to zero.
+    let gradient = |n: u8| match n {
+        0 => std::array::from_fn(|k| -(rows[0][k] + rows[1][k] + rows[2][k])),
+        n => rows[usize::from(n) - 1],
+    };
+    let mut inverse_jacobian = [0.0; 9];
+    for (row, n) in inverse_jacobian.as_chunks_mut::<3>().0.iter_mut().zip(&order[1..]) {
+        *row = gradient(*n);
+    }
+    RestPoint { inverse_jacobian, weight: point.weight }
 }
 
 /// Disjoint strips of some elements, by their nodes, and the elements of none, ascending.

@@ -3,7 +3,9 @@
 /// What a pass binds, in the order of its binding numbers in group 0, from 0.
 ///
 /// Every vector over nodes is `array<vec4<f32>>`: three components, and in the fourth the node's constraint mask (bits
-/// 1, 2, 4 for x, y, z), which no pass changes. With E elements in a pass, P quadrature points and n nodes an element:
+/// 1, 2, 4 for x, y, z), which no pass changes. A pass over strips counts strips where this says elements: of these the
+/// nodes are those of a strip, quadrature points those of its three elements, and what elements have by number is that of
+/// the first ones of all strips, then of the second and of the third ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Binding {
     /// `uniform`, 16 bytes: elements of the pass (`u32`), whether it keeps margins while elements are inside (`u32`), the

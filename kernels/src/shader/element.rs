@@ -1,4 +1,5 @@
-//! Element passes: gather G, evaluate a law's point kernel, contract or store; one invocation some elements.
+//! Element passes: gather G, evaluate a law's point kernel, contract or store; one invocation some elements, or strips of
+//! them (`strip`).
 //!
 //! What is printed here moves values and adds up quadrature points; all that a law or an element computes is in the
 //! functions that the generator printed. An element with one point has no loop and no sum.
@@ -30,6 +31,15 @@ pub enum Pass {
     DDamping,
     /// The diagonal of minus that differential at each element's nodes into its slots.
     DampingDiagonal,
+}
+
+/// What an invocation of a pass computes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Unit {
+    /// An element.
+    Element,
+    /// Three linear tetrahedra in a row (see [`crate::strip`]).
+    Strip,
 }
 
 /// All passes.
@@ -77,9 +87,14 @@ impl Pass {
 }
 
 /// A pass of a law on an element; none of damping where the law has no dissipation.
-pub fn element_pass(law: &LawEntry, element: &ElementEntry, pass: Pass) -> Option<Shader> {
+///
+/// # Panics
+/// Strips of another element than the linear tetrahedron.
+pub fn element_pass(law: &LawEntry, element: &ElementEntry, pass: Pass, unit: Unit) -> Option<Shader> {
     let function = pass.function(law)?;
+    assert!(unit == Unit::Element || element.info.is_linear_simplex, "strips are of linear tetrahedra");
     let composed = Composed {
+        unit,
         pass,
         function,
         functions: element.functions,
@@ -92,7 +107,8 @@ pub fn element_pass(law: &LawEntry, element: &ElementEntry, pass: Pass) -> Optio
 }
 
 /// One law's function on one element.
-struct Composed<'a> {
+pub(super) struct Composed<'a> {
+    unit: Unit,
     pass: Pass,
     function: &'a PointFunction,
     functions: &'a ElementFunctions,
@@ -105,14 +121,14 @@ impl Composed<'_> {
         self.function.arguments.contains(&argument)
     }
 
-    fn gathered(&self) -> impl Iterator<Item = (&'static str, &'static str, &'static str)> {
+    pub(super) fn gathered(&self) -> impl Iterator<Item = (&'static str, &'static str, &'static str)> {
         GATHERED
             .iter()
             .filter(|(argument, ..)| self.reads(*argument))
             .map(|(_, name, reader, of)| (*name, *reader, *of))
     }
 
-    fn gathers(&self) -> bool {
+    pub(super) fn gathers(&self) -> bool {
         self.gathered().next().is_some()
     }
 
@@ -129,11 +145,11 @@ impl Composed<'_> {
         self.pass != Pass::Cauchy || !self.is_single()
     }
 
-    fn slots(&self) -> bool {
+    pub(super) fn slots(&self) -> bool {
         self.pass.contracts() || self.pass.is_diagonal()
     }
 
-    fn margin(&self) -> bool {
+    pub(super) fn margin(&self) -> bool {
         self.function.field.is_some()
     }
 
@@ -161,8 +177,8 @@ impl Composed<'_> {
         if self.gradients() {
             out += &if self.info.is_linear_simplex { shape_gradients() } else { self.mapping() };
         }
-        for (_, reader, of) in self.gathered() {
-            out += &self.gather(reader, of);
+        if self.unit == Unit::Element {
+            self.gathered().for_each(|(_, reader, of)| out += &self.gather(reader, of));
         }
         let functions = [
             (self.gathers(), self.functions.gradient),
@@ -171,7 +187,10 @@ impl Composed<'_> {
         ];
         out.extend(functions.into_iter().filter_map(|(needed, text)| needed.then_some(text)));
         out += self.function.text;
-        out += &self.one_element();
+        out += &match self.unit {
+            Unit::Element => self.one_element(),
+            Unit::Strip => self.one_strip(),
+        };
         out + &entry_point(bindings.contains(&Binding::Gate))
     }
 
@@ -248,24 +267,37 @@ impl Composed<'_> {
         for (name, reader, _) in self.gathered() {
             out.line(&format!("let nodal_{name} = {reader}({nodes});"));
         }
-        if self.reads(Argument::Constants) {
-            out.line("let first = constants_stride * e;");
-            let entry = |k| if k == 0 { "constants[first]".to_string() } else { format!("constants[first + {k}u]") };
-            out.line(&format!("let c = {};", array(&(0..self.constants).map(entry).collect::<Vec<_>>())));
-        }
+        self.read_constants("e", &mut out);
         if self.is_single() {
-            self.point(&mut out);
+            self.point("e", &mut out);
         } else {
             for sum in self.sums() {
                 out.line(&sum);
             }
             out.open(&format!("for (var q = 0u; q < {}u; q++) {{", self.info.points.len()));
-            self.point(&mut out);
+            self.point("e", &mut out);
             out.close();
         }
-        self.store(&mut out);
+        self.store("e", &mut out);
+        if self.slots() {
+            out.line(&format!("let slot = element_pass.first_slot + {}u * e;", self.info.nodes));
+            for j in 0..self.info.nodes {
+                let [x, y, z] = [3 * j, 3 * j + 1, 3 * j + 2];
+                let place = if j == 0 { "slot".to_string() } else { format!("slot + {j}u") };
+                out.line(&format!("slots[{place}] = vec4<f32>(f[{x}], f[{y}], f[{z}], 0.0f);"));
+            }
+        }
         out.close();
         out.text
+    }
+
+    /// Reads the constants of an element, by its number.
+    pub(super) fn read_constants(&self, element: &str, out: &mut Lines) {
+        if self.reads(Argument::Constants) {
+            out.line(&format!("let first = constants_stride * {element};"));
+            let entry = |k| if k == 0 { "constants[first]".to_string() } else { format!("constants[first + {k}u]") };
+            out.line(&format!("let c = {};", array(&(0..self.constants).map(entry).collect::<Vec<_>>())));
+        }
     }
 
     /// What is added up over the points of an element with several.
@@ -282,12 +314,12 @@ impl Composed<'_> {
         sums
     }
 
-    /// What is computed at one quadrature point, q where there are several.
-    fn point(&self, out: &mut Lines) {
+    /// What is computed at one quadrature point, q where there are several; `rest` is where its first row at rest is.
+    pub(super) fn point(&self, rest: &str, out: &mut Lines) {
         let single = self.is_single();
         if self.gradients() {
             if self.info.is_linear_simplex {
-                out.line("let b = shape_gradients(e);");
+                out.line(&format!("let b = shape_gradients({rest});"));
             } else {
                 let q = if single { "0u" } else { "q" };
                 out.line(&format!("let s = slopes({q});"));
@@ -295,7 +327,8 @@ impl Composed<'_> {
             }
         }
         if self.weight() {
-            out.line(if single { "let w = rest[e].w;" } else { "let w = rest[3u * q * element_pass.elements + e].w;" });
+            let first = if single { rest } else { "3u * q * element_pass.elements + e" };
+            out.line(&format!("let w = rest[{first}].w;"));
         }
         for (name, ..) in self.gathered() {
             out.line(&format!("let {name} = gradient(nodal_{name}, {});", self.geometry()));
@@ -348,29 +381,22 @@ impl Composed<'_> {
         out.line(&format!("let f = {};", array(&values)));
     }
 
-    /// Stores what the points gave.
-    fn store(&self, out: &mut Lines) {
+    /// Stores what an element has but its forces, by its number.
+    pub(super) fn store(&self, element: &str, out: &mut Lines) {
         match self.pass {
-            Pass::Energy => out.line("energies[e] = integral;"),
+            Pass::Energy => out.line(&format!("energies[{element}] = integral;")),
             Pass::Cauchy => {
                 let part = if self.is_single() { "" } else { " / volume" };
                 for k in 0..9 {
-                    out.line(&format!("stresses[9u * e + {k}u] = sigma[{k}]{part};"));
+                    out.line(&format!("stresses[9u * {element} + {k}u] = sigma[{k}]{part};"));
                 }
             }
-            _ => {
-                out.line(&format!("let slot = element_pass.first_slot + {}u * e;", self.info.nodes));
-                for j in 0..self.info.nodes {
-                    let [x, y, z] = [3 * j, 3 * j + 1, 3 * j + 2];
-                    let place = if j == 0 { "slot".to_string() } else { format!("slot + {j}u") };
-                    out.line(&format!("slots[{place}] = vec4<f32>(f[{x}], f[{y}], f[{z}], 0.0f);"));
-                }
-            }
+            _ => {}
         }
         if self.margin() {
             // Of several passes the margin of the first that is outside stays.
             out.open("if element_pass.keeps_margins == 0u || !(margin > 0.0f) {");
-            out.line("margins[e] = margin;");
+            out.line(&format!("margins[{element}] = margin;"));
             out.close();
         }
     }

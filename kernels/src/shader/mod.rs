@@ -11,9 +11,10 @@ mod frame;
 mod functions;
 mod lines;
 mod nodes;
+mod strip;
 
 pub use binding::Binding;
-pub use element::{PASSES, Pass, element_pass};
+pub use element::{PASSES, Pass, Unit, element_pass};
 pub use functions::{Argument, DampingFunctions, ElementFunctions, LawFunctions, PointFunction};
 pub use nodes::{node_product, node_sum};
 

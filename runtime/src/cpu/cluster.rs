@@ -5,13 +5,15 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
 use tensormass_kernels::strip::MEMBERS;
-use tensormass_kernels::{Blocks, Cluster as Elements, Extent, Node, RestPoint};
+use tensormass_kernels::{Blocks, Cluster as Elements, Engine, Extent, Node, Place, RestPoint, compose};
 
 use super::Precision;
 use super::vectors::CpuVector;
 use crate::body::{Body, LawBatch};
-use crate::strips::{Member, strips};
+use crate::order::clusters;
+use crate::strips::{Member, reordered, strips};
 
 /// Elements of one law and kind that are near each other.
 pub(super) struct Cluster {
@@ -149,6 +151,14 @@ fn four<R: Copy>(numbers: &[R], node: usize, to: &mut Node<R>) {
     }
 }
 
+/// Bytes of the places of nodes that the elements of a batch have, on the widest registers of this machine.
+pub fn place_bytes<R: Precision>(body: &Body, batch: &LawBatch) -> usize {
+    let (info, lanes) = (batch.element.info, compose::<R>(Engine::best(), batch.element, batch.law).lanes());
+    let places = |range| Arranged::new(body, batch, range, lanes).extent.places(lanes, info.nodes);
+    let ranges = clusters(info.nodes, batch.elements.len());
+    ranges.into_par_iter().map(places).sum::<usize>() * size_of::<Place>()
+}
+
 /// The elements of a cluster in the order of its blocks.
 pub(super) struct Arranged {
     /// Places in the batch; of strips, which come first, with the order of the nodes.
@@ -161,7 +171,6 @@ impl Arranged {
     /// A range of a batch, as strips on so many lanes as far as they fill blocks.
     pub fn new(body: &Body, batch: &LawBatch, range: Range<usize>, lanes: usize) -> Self {
         let alone = |element: u32| Member { element, order: [0, 1, 2, 3] };
-        let in_batch = |member: Member| Member { element: range.start as u32 + member.element, ..member };
         let mut found = vec![];
         if batch.element.info.is_linear_simplex {
             let nodes = |e: &u32| body.elements[*e as usize].try_into().expect("a tetrahedron has four nodes");
@@ -182,7 +191,7 @@ impl Arranged {
         let others: Vec<u32> = (0..range.len() as u32).filter(|e| is_alone[*e as usize]).collect();
         members.extend(interleaved(others.len(), lanes).map(|k| alone(others[k])));
         let extent = Extent { elements: range.len(), strips: blocks };
-        Self { members: members.into_iter().map(in_batch).collect(), extent }
+        Self { members: members.into_iter().map(|m| m.after(range.start)).collect(), extent }
     }
 }
 
@@ -192,19 +201,4 @@ fn interleaved(count: usize, lanes: usize) -> impl Iterator<Item = usize> {
     let blocks = count / lanes;
     let whole = (0..blocks * lanes).map(move |k| k % lanes * blocks + k / lanes);
     whole.chain(blocks * lanes..count)
-}
-
-/// A linear tetrahedron at rest, with its nodes in another order.
-fn reordered(point: &RestPoint<f64>, order: [u8; 4]) -> RestPoint<f64> {
-    let rows = point.inverse_jacobian.as_chunks::<3>().0;
-    // The gradients of nodes 1, 2, 3; with that of node 0 they sum to zero.
-    let gradient = |n: u8| match n {
-        0 => std::array::from_fn(|k| -(rows[0][k] + rows[1][k] + rows[2][k])),
-        n => rows[usize::from(n) - 1],
-    };
-    let mut inverse_jacobian = [0.0; 9];
-    for (row, n) in inverse_jacobian.as_chunks_mut::<3>().0.iter_mut().zip(&order[1..]) {
-        *row = gradient(*n);
-    }
-    RestPoint { inverse_jacobian, weight: point.weight }
 }

@@ -18,7 +18,7 @@ use super::{CpuBackend, Precision};
 use crate::backend::{Backend, ForceField, LeftDomain, Operator, REGISTERS, RUNNING, SUM};
 use crate::body::{Body, LawBatch};
 use crate::mesh::Incidence;
-use crate::order::cluster_size;
+use crate::order::clusters;
 use crate::tangent::{self, Tangent};
 
 /// The elements of one law and kind.
@@ -53,8 +53,7 @@ impl<R: Precision> CpuBatch<R> {
     fn new(body: &Body, batch: &LawBatch, places: &[u32], met: &mut usize, engine: Engine) -> Self {
         let info = batch.element.info;
         let compute = compose::<R>(engine, batch.element, batch.law);
-        let (count, size) = (batch.elements.len(), cluster_size(info.nodes, batch.elements.len()));
-        let ranges: Vec<_> = (0..count).step_by(size).map(|start| start..count.min(start + size)).collect();
+        let ranges = clusters(info.nodes, batch.elements.len());
         let arranged: Vec<Arranged> =
             ranges.into_par_iter().map(|range| Arranged::new(body, batch, range, compute.lanes())).collect();
         let extents: Vec<Extent> = arranged.iter().map(|a| a.extent).collect();

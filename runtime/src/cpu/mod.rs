@@ -7,6 +7,7 @@ mod one;
 mod tune;
 mod vectors;
 
+pub use cluster::place_bytes;
 pub use field::CpuField;
 pub use one::One;
 pub use tensormass_kernels::Engine;

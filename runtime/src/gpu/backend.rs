@@ -175,7 +175,7 @@ impl GpuBackend {
     }
 
     /// How the body's elements and nodes are ordered.
-    pub(super) fn order(&self) -> &DeviceOrder {
+    pub(crate) fn order(&self) -> &DeviceOrder {
         &self.order
     }
 

@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use tensormass_kernels::shader::{Argument, Binding, Pass, Shader, element_pass, node_product, node_sum};
+use tensormass_kernels::shader::{Argument, Binding, Pass, Shader, Unit, element_pass, node_product, node_sum};
 use tensormass_kernels::{ElementEntry, LawEntry};
 
 use crate::backend::{Backend, ForceField, LeftDomain, Operator};
@@ -44,8 +44,8 @@ pub struct GpuField {
     state: Option<GpuVector>,
     gate: Rc<Memory>,
     elements: usize,
-    /// Element passes by law, kind and the stride of constants, compiled when first needed: a scene has those of its pairs.
-    element_passes: HashMap<(&'static str, &'static str, u32, Pass), Rc<Compiled>>,
+    /// Element passes by law, kind, the stride of constants and what an invocation computes, compiled when first needed: a scene has those of its pairs.
+    element_passes: HashMap<(&'static str, &'static str, u32, Pass, Unit), Rc<Compiled>>,
     /// The node passes, by whether they make a product.
     node_passes: HashMap<bool, Rc<Compiled>>,
     work_group_size: u32,
@@ -126,13 +126,18 @@ impl GpuField {
     }
 
     /// The pass of a law on a kind of element, compiled.
-    fn element_pass(&mut self, law: &LawEntry, element: &ElementEntry, stride: u32, pass: Pass) -> Rc<Compiled> {
-        let key = (law.info.name, element.info.name, stride, pass);
+    fn element_pass(
+        &mut self,
+        (law, element, unit): (&LawEntry, &ElementEntry, Unit),
+        stride: u32,
+        pass: Pass,
+    ) -> Rc<Compiled> {
+        let key = (law.info.name, element.info.name, stride, pass, unit);
         if let Some(made) = self.element_passes.get(&key) {
             return Rc::clone(made);
         }
-        let shader = element_pass(law, element, pass).expect("damping runs over laws with a dissipation");
-        let label = format!("{pass:?}: {}, {}", law.info.name, element.info.name);
+        let shader = element_pass(law, element, pass, unit).expect("damping runs over laws with a dissipation");
+        let label = format!("{pass:?}: {}, {}, {unit:?}", law.info.name, element.info.name);
         let made = Rc::new(self.compiled(shader, stride, &label));
         self.element_passes.insert(key, Rc::clone(&made));
         made
@@ -178,15 +183,14 @@ impl GpuField {
     /// Pass 1 of one page: a pass of each law and kind.
     fn element_passes(&mut self, of: Of, page: usize, pass: Pass, bound: &Bound) {
         for range in 0..self.pages_of(of)[page].ranges.len() {
-            let Range { stride, law, element, .. } = self.pages_of(of)[page].ranges[range];
-            let compiled = self.element_pass(law, element, stride, pass);
+            let Range { stride, law, element, unit, units, .. } = self.pages_of(of)[page].ranges[range];
+            let compiled = self.element_pass((law, element, unit), stride, pass);
             let range = &self.pages_of(of)[page].ranges[range];
             let storage: Vec<&Memory> = compiled.bindings[1..].iter().map(|&b| self.buffer(b, range, bound)).collect();
-            let count = range.elements.len();
-            let invocations = count.div_ceil(self.elements_per_invocation as usize);
+            let invocations = units.div_ceil(self.elements_per_invocation as usize);
             let groups = self.recorder.groups(invocations, self.work_group_size);
             let keeps = u32::from(pass == Pass::Force && self.domains == Domains::Kept);
-            self.recorder.dispatch(&compiled.kernel, [count as u32, keeps, range.first_slot, 0], &storage, groups);
+            self.recorder.dispatch(&compiled.kernel, [units as u32, keeps, range.first_slot, 0], &storage, groups);
         }
     }
 

@@ -16,8 +16,10 @@ pub(super) struct Layout {
     pub slot: f64,
     /// Rest data of a quadrature point.
     pub point: f64,
-    /// What tells an element where its node is.
-    pub place: f64,
+    /// What tells an element where its nodes are.
+    pub places: f64,
+    /// What tells a block of a matrix where its node is.
+    pub column: f64,
     /// Partial forces an element: with clusters those of nodes that are foreign to one.
     pub slots: f64,
     /// What tells a cluster where such a node is; 0 without clusters.
@@ -38,7 +40,8 @@ impl Default for Layout {
             vector: none,
             slot: none,
             point: none,
-            place: none,
+            places: none,
+            column: none,
             slots: none,
             local: none,
             own: none,
@@ -68,7 +71,7 @@ impl Count<'_> {
     pub fn read(&self, vectors: u32, stored: usize) -> f64 {
         let (info, layout) = (self.subject.element.info, &self.layout);
         let point = layout.point + layout.real * stored as f64;
-        layout.place * info.nodes as f64
+        layout.places
             + layout.local * layout.slots
             + point * info.points.len() as f64
             + f64::from(vectors) * layout.vector * self.nodes
@@ -88,7 +91,7 @@ impl Count<'_> {
             Tangent::Assembled => {
                 // A block serves twice, with a difference of vectors; it knows one node besides that of its row.
                 let flops = 39.0 * blocks;
-                let matrix = blocks * (9.0 * real + self.layout.place) + self.layout.local * self.layout.slots;
+                let matrix = blocks * (9.0 * real + self.layout.column) + self.layout.local * self.layout.slots;
                 (flops.round() as u32, matrix + vector * self.nodes + self.sums())
             }
         }

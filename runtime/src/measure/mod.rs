@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use tensormass_kernels::{ElementEntry, LawEntry};
 
 use crate::backend::{Backend, ForceField, LeftDomain};
-use crate::cpu::{CpuBackend, CpuField, Precision};
+use crate::cpu::{CpuBackend, CpuField, Precision, place_bytes};
 use crate::device::DeviceError;
 #[cfg(feature = "gpu")]
 use crate::gpu::{GpuBackend, GpuField};
@@ -261,10 +261,12 @@ fn on<M: Measurement>(target: &Target, subject: &Subject, measurement: M) -> Res
         (Target::Gpu(gpu, options), scene::Precision::F32) => {
             let backend = GpuBackend::new(std::sync::Arc::clone(gpu), &model.body, *options)?;
             let field = GpuField::new(&backend, &model.body)?;
-            // Each node of each element has a slot.
-            let slots = subject.element.info.nodes as f64;
+            let (elements, nodes) = (model.body.elements.len() as f64, subject.element.info.nodes);
+            let grouped = &backend.order().elements;
+            let slots = grouped.iter().map(|g| g.slots(nodes)).sum::<usize>() as f64 / elements;
+            let places = grouped.iter().map(|g| 16 * g.fours(nodes)).sum::<usize>() as f64 / elements;
             let sizes = Layout { real: 4.0, vector: 16.0, slot: 16.0, ..Layout::default() };
-            let layout = Layout { point: 48.0, place: 4.0, slots, ..sizes };
+            let layout = Layout { point: 48.0, places, slots, ..sizes };
             measurement.on(subject, model, backend, field, layout)
         }
         #[cfg(feature = "gpu")]
@@ -286,6 +288,8 @@ fn on_cpu<R: Precision, M: Measurement>(
     let blocks: usize = model.body.batches.iter().map(|batch| blocks(&model.body, batch)).sum();
     let blocks = blocks as f64 / model.body.elements.len() as f64;
     let tangent = tangents[0];
-    let layout = Layout { place: 2.0, slots, local: 4.0, own: 3.0 * real, tangent, blocks, ..sizes };
+    let places = model.body.batches.iter().map(|batch| place_bytes::<R>(&model.body, batch)).sum::<usize>() as f64;
+    let places = places / model.body.elements.len() as f64;
+    let layout = Layout { places, column: 2.0, slots, local: 4.0, own: 3.0 * real, tangent, blocks, ..sizes };
     measurement.on(subject, model, backend, field, layout)
 }

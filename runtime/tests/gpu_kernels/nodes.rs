@@ -9,12 +9,13 @@ use tensormass_runtime::history::History;
 use tensormass_runtime::mass::{MassMatrix, Masses};
 use tensormass_runtime::mesh::{Mesh, beam};
 use tensormass_runtime::order::DeviceOrder;
-use tensormass_runtime::{LawEntry, laws};
+use tensormass_runtime::{LawEntry, laws, linear_tetrahedron};
 use tensormass_testing::random::Rng;
 
 use crate::meshes::{boxes_beside_wedges, distorted, renumbered, unit};
 use crate::states::{
-    Analysis, Bound, Kernel, Vector, batches, compare, of_mesh, other_elements, representatives, single, vectors,
+    Analysis, Bound, Dealt, Kernel, Vector, batches, compare, in_pieces, in_turn, of_mesh, other_elements,
+    representatives, single, vectors,
 };
 use crate::support::gpu::test_device;
 use crate::{On, on_cpu, on_gpu};
@@ -56,8 +57,12 @@ impl Shared {
 
     /// A mesh, with displacements of up to a magnitude.
     fn of(mesh: &Mesh, laws: &[&'static LawEntry], magnitude: f64, seed: u64) -> Self {
+        Self::dealt(mesh, laws, in_turn, magnitude, seed)
+    }
+
+    fn dealt(mesh: &Mesh, laws: &[&'static LawEntry], dealt: Dealt, magnitude: f64, seed: u64) -> Self {
         let mut rng = Rng::new(seed);
-        let batches = batches(laws, mesh, &mut rng);
+        let batches = batches(laws, mesh, dealt, &mut rng);
         let mut body = of_mesh(mesh, batches, &mut rng);
         let nodes = mesh.nodes().len();
         let plane = mesh.blocks()[0].info().dimension == 2;
@@ -254,6 +259,38 @@ fn sums_of_any_numbering_are_those_of_f64_rounded() {
     assert!(!places(&body.body).is_sorted());
     for (least, binding_bytes) in [(1, None), (3, Some(SMALL))] {
         check(&gpu, &body, GpuOptions { binding_bytes, ..GpuOptions::default() }, &Analysis::new(), least);
+    }
+}
+
+/// Three elements in a row an invocation, where there are many of a law; the numbers of each element, too.
+#[test]
+fn sums_of_strips_are_those_of_f64_rounded() {
+    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let analysis = Analysis::new();
+    let mesh = distorted(&unit(linear_tetrahedron(), 11), 0.2, 9);
+    let laws = representatives();
+    // Edges are a tenth long.
+    let body = Shared::dealt(&mesh, &laws, in_pieces, 0.003, 5);
+    let order = DeviceOrder::of(&body.body).elements;
+    assert!(order.iter().any(|batch| !batch.strips.is_empty() && !batch.alone.is_empty()), "both kinds of passes");
+    assert!(body.body.batches.iter().zip(&order).all(|(b, o)| b.law.damping.is_none() || !o.strips.is_empty()));
+    // Pages end within strips.
+    for (least, binding_bytes) in [(1, None), (3, Some(48 * 7986 / 4))] {
+        check(&gpu, &body, GpuOptions { binding_bytes, ..GpuOptions::default() }, &analysis, least);
+    }
+    let mut cpu = on_cpu(&body.body);
+    let mut on = on_gpu(&gpu, &body.body, GpuOptions::default());
+    for (kernel, width) in [(Kernel::Energy, 1), (Kernel::Cauchy, 9)] {
+        let (wanted, found) = (cpu.fresh(kernel, &body.u, &body.du), on.fresh(kernel, &body.u, &body.du));
+        let mut bounds = vec![Bound::exact(0.0); found.len()];
+        for batch in &body.body.batches {
+            let values = analysis.batch(kernel, &body.body, batch, &body.u, &body.du);
+            for (e, value) in batch.elements.iter().zip(values.chunks(width)) {
+                bounds[width * *e as usize..][..width].copy_from_slice(value);
+            }
+        }
+        let what = format!("{kernel:?} of strips");
+        println!("{what}: {:.3} of the bound", compare(&what, &found, &wanted, &bounds));
     }
 }
 

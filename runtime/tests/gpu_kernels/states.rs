@@ -8,6 +8,8 @@ use std::collections::HashMap;
 use tensormass_kernels::{ElementEntry, GENERATED, RestPoint, elements};
 use tensormass_runtime::body::{Body, LawBatch, Rows};
 use tensormass_runtime::mesh::{Block, Groups, Mesh, NodeId};
+use tensormass_runtime::order::DeviceOrder;
+use tensormass_runtime::strips::reordered;
 use tensormass_runtime::{LawEntry, laws};
 use tensormass_testing::codegen::derivation::Derivation;
 use tensormass_testing::codegen::element::{ElementKernels, declarations, kernels};
@@ -83,9 +85,23 @@ pub fn body(elements: Rows<u32>, rest: &Rows<RestPoint<f64>>, batches: Vec<LawBa
     }
 }
 
+/// Which of a range of elements one of so many batches has.
+pub type Dealt = fn(std::ops::Range<u32>, usize, usize) -> Vec<u32>;
+
+/// One of each few.
+pub fn in_turn(range: std::ops::Range<u32>, k: usize, count: usize) -> Vec<u32> {
+    range.skip(k).step_by(count).collect()
+}
+
+/// A part in one piece.
+pub fn in_pieces(range: std::ops::Range<u32>, k: usize, count: usize) -> Vec<u32> {
+    let end = |k: usize| range.start + (range.len() * k / count) as u32;
+    (end(k)..end(k + 1)).collect()
+}
+
 /// Two batches a law and kind, one with a material for all elements and one with a material each; elements of a kind are
 /// dealt out in turn.
-pub fn batches(laws: &[&'static LawEntry], mesh: &Mesh, rng: &mut Rng) -> Vec<LawBatch> {
+pub fn batches(laws: &[&'static LawEntry], mesh: &Mesh, dealt: Dealt, rng: &mut Rng) -> Vec<LawBatch> {
     let count = 2 * laws.len();
     let mut first = 0;
     let mut all = vec![];
@@ -93,7 +109,7 @@ pub fn batches(laws: &[&'static LawEntry], mesh: &Mesh, rng: &mut Rng) -> Vec<La
         let end = first + block.len() as u32;
         for k in 0..count {
             let law = laws[k / 2];
-            let (elements, per_element) = ((first + k as u32..end).step_by(count).collect::<Vec<_>>(), k % 2 == 1);
+            let (elements, per_element) = (dealt(first..end, k, count), k % 2 == 1);
             let materials = if per_element { elements.len() } else { 1 };
             let material = |_| law.constants(&rng.parameters(law.info));
             let constants = (0..materials).flat_map(material).map(single).collect();
@@ -136,7 +152,7 @@ impl Disjoint {
         let positions: Vector = (0..count).flat_map(|_| shape(element, rng)).collect();
         let block = Block { element, nodes: (0..(count * each) as u32).map(NodeId).collect() };
         let mesh = Mesh::new(positions, vec![block], Groups::default()).unwrap_or_else(|e| panic!("{e}"));
-        let body = of_mesh(&mesh, batches(laws, &mesh, rng), rng);
+        let body = of_mesh(&mesh, batches(laws, &mesh, in_turn, rng), rng);
         let zero = vec![[0.0; 3]; count * each];
         let mut all = Self { body, nodes: mesh.nodes().to_vec(), u: zero.clone(), du: zero };
         for batch in &all.body.batches {
@@ -252,21 +268,34 @@ impl Analysis {
         })
     }
 
-    /// The numbers that a kernel computes of the element in this place of a batch.
-    pub fn element(
+    /// The numbers that a kernel computes of the element in this place of a batch, with its nodes in the order of a strip.
+    fn element(
         &self,
         kernel: Kernel,
         body: &Body,
-        (batch, place): (&LawBatch, usize),
+        (batch, place, order): (&LawBatch, usize, Option<[u8; 4]>),
         u: &[[f64; 3]],
         du: &[[f64; 3]],
     ) -> Vec<Bound> {
-        let (c, points) = given(body, batch, place);
-        let nodes = &body.elements[batch.elements[place] as usize];
-        let nodes = [nodal(nodes, u), nodal(nodes, du)];
+        let (c, mut points) = given(body, batch, place);
+        let mut nodes = body.elements[batch.elements[place] as usize].to_vec();
+        if let Some(order) = order {
+            nodes = order.iter().map(|n| nodes[usize::from(*n)]).collect();
+            let rest = reordered(&body.rest[batch.elements[place] as usize][0], order);
+            // A device has them in f32.
+            points[0].inverse = rest.inverse_jacobian.into_iter().map(Bound::nearest).collect();
+        }
+        let nodes = [nodal(&nodes, u), nodal(&nodes, du)];
         let at = |point: &Point| self.at_point(kernel, batch, point, &c, &nodes);
         let sum = |a: Vec<Bound>, b: Vec<Bound>| a.into_iter().zip(b).map(|(a, b)| a + b).collect();
         let values = points.iter().map(at).reduce(sum).expect("an element has a point");
+        if let (Some(order), 12) = (order, values.len()) {
+            let mut by_node = values.clone();
+            for (n, value) in order.iter().zip(values.chunks(3)) {
+                by_node[3 * usize::from(*n)..][..3].copy_from_slice(value);
+            }
+            return by_node;
+        }
         if kernel != Kernel::Cauchy || points.len() == 1 {
             return values;
         }
@@ -319,8 +348,23 @@ impl Analysis {
 
     /// The numbers of all elements of a batch, element after element.
     pub fn batch(&self, kernel: Kernel, body: &Body, batch: &LawBatch, u: &[[f64; 3]], du: &[[f64; 3]]) -> Vec<Bound> {
-        (0..batch.elements.len()).flat_map(|place| self.element(kernel, body, (batch, place), u, du)).collect()
+        let orders = orders(body, batch);
+        let element =
+            |(place, order): (usize, &Option<[u8; 4]>)| self.element(kernel, body, (batch, place, *order), u, du);
+        orders.iter().enumerate().flat_map(element).collect()
     }
+}
+
+/// In which order a device has the nodes of each element of a batch, where that is a strip's.
+fn orders(body: &Body, batch: &LawBatch) -> Vec<Option<[u8; 4]>> {
+    let number = body.batches.iter().position(|other| std::ptr::eq(other, batch)).expect("a batch of the body");
+    let mut orders = vec![None; batch.elements.len()];
+    for strip in &DeviceOrder::of(body).elements[number].strips {
+        for (place, member) in strip.iter().enumerate() {
+            orders[member.element as usize] = Some(member.along(place));
+        }
+    }
+    orders
 }
 
 fn nodal(nodes: &[u32], u: &[[f64; 3]]) -> Vec<Bound> {
