@@ -2,7 +2,7 @@
 //! number, each lane's own.
 //!
 //! ln m = 2 artanh s with s = (m - 1) / (m + 1), for m within a factor of the square root of 2 of a power of 2, summed
-//! such that the leading term, m - 1, is exact; exp x = 2^n exp r with |r| <= ln 2 / 2. The sums are Taylor's.
+//! such that the leading term, m - 1, is exact; exp x = 2^n exp r with |r| <= ln 2 / 2. Other sums are Taylor's.
 
 use super::Lanes;
 use crate::real::Real;
@@ -27,8 +27,9 @@ pub(crate) trait Constants: Real {
     const LOGARITHM: [f64; 2];
     /// The greatest magnitude whose exponential is computed here.
     const EXPONENTIAL: f64;
-    /// Terms of the logarithm after the first, |s| < .1716.
-    const LN_TERMS: usize;
+    /// Coefficients of powers of s^2 in (2 artanh(s) / s - 2) / s^2, |s| <= 3 - 2 sqrt(2), as many as a pair has twice:
+    /// Chebyshev's, within 2^-35 and 2^-64 of the logarithm.
+    const LOGARITHM_SERIES: &'static [[f64; 2]];
     /// Terms of x - ln(1 + x), |s| <= 1/3.
     const LOG1PMX_TERMS: usize;
     /// The greatest power of r in its exponential.
@@ -45,7 +46,8 @@ impl Constants for f32 {
     };
     const LOGARITHM: [f64; 2] = [f32::MIN_POSITIVE as f64, 8.507_059_173_023_462e37];
     const EXPONENTIAL: f64 = 87.0;
-    const LN_TERMS: usize = 5;
+    const LOGARITHM_SERIES: &'static [[f64; 2]] =
+        &[[0.6666666655449709, 0.40000121839806124], [0.28550820815960665, 0.23330467216303835]];
     const LOG1PMX_TERMS: usize = 8;
     const EXP_TERMS: u32 = 7;
     const EXPM1MX_TERMS: u32 = 12;
@@ -59,7 +61,12 @@ impl Constants for f64 {
     };
     const LOGARITHM: [f64; 2] = [f64::MIN_POSITIVE, 4.494_232_837_155_79e307];
     const EXPONENTIAL: f64 = 708.0;
-    const LN_TERMS: usize = 11;
+    const LOGARITHM_SERIES: &'static [[f64; 2]] = &[
+        [0.6666666666666666, 0.4000000000000088],
+        [0.28571428570803614, 0.22222222391713917],
+        [0.18181795640132906, 0.15386239702814658],
+        [0.13268773138656886, 0.13086626147840102],
+    ];
     const LOG1PMX_TERMS: usize = 17;
     const EXP_TERMS: u32 = 13;
     const EXPM1MX_TERMS: u32 = 20;
@@ -78,10 +85,14 @@ fn between<V: Lanes>(x: V, low: f64, high: f64) -> bool {
 fn parts<V: Parts>(f: V) -> [V; 3] {
     let s = f / (V::from_f64(2.0) + f);
     let z = s * s;
-    let mut series = V::from_f64(0.0);
-    for n in (1..=<V::Scalar as Constants>::LN_TERMS).rev() {
-        series = series.mul_add(z, V::from_f64(2.0 / (2 * n + 1) as f64));
+    // Even and odd powers beside each other: one chain would be twice as long.
+    let (square, coefficients) = (z * z, <V::Scalar as Constants>::LOGARITHM_SERIES);
+    let (mut even, mut odd) = (V::from_f64(0.0), V::from_f64(0.0));
+    for n in (0..coefficients.len()).rev() {
+        even = even.mul_add(square, V::from_f64(coefficients[n][0]));
+        odd = odd.mul_add(square, V::from_f64(coefficients[n][1]));
     }
+    let series = odd.mul_add(z, even);
     let half_square = V::from_f64(0.5) * f * f;
     [half_square, z.mul_add(series, half_square), s]
 }
