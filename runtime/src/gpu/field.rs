@@ -1,8 +1,8 @@
 //! The elements of a body on a GPU: two passes (Faure et al. 2012, Algorithm 1), a page of the mesh at a time.
 //!
-//! Pass 1: one invocation an element writes the partial force of each of its nodes into a slot of its own. Pass 2: one
-//! invocation a node sums the slots of its elements in ascending order. No two invocations write one place. A page is as much of the mesh
-//! as the device can bind; smaller bodies have one. Pages take turns with one buffer of slots.
+//! Pass 1: one invocation an element, or a strip of three, writes the partial force of each of its nodes into a slot of its
+//! own. Pass 2: one invocation a node sums the slots of its elements in ascending order. No two invocations write one place.
+//! A page is as much of the mesh as the device can bind; smaller bodies have one. Pages take turns with one buffer of slots.
 
 use std::collections::HashMap;
 use std::rc::Rc;
