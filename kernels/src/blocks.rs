@@ -168,13 +168,9 @@ impl<R> Part<'_, R> {
     /// other, lane after lane.
     pub fn nodes(&self) -> impl Iterator<Item = Vec<u32>> {
         let (lanes, nodes) = (self.blocks.lanes, self.blocks.nodes);
-        let row = move |block: usize, node: usize| match block < MEMBERS * self.span.extent.strips {
-            true => self.span.row(block - block % MEMBERS, nodes) + STRIP[block % MEMBERS][node],
-            false => self.span.row(block, nodes) + node,
-        };
         let places = move |row: usize| &self.blocks.places.all()[row * lanes..][..lanes];
         (0..self.len()).map(move |block| {
-            let places = (0..nodes).flat_map(|node| places(row(block, node)));
+            let places = (0..nodes).flat_map(|node| places(self.span.node_row(block, node, nodes)));
             places.map(|place| u32::from(*place) / stride::<R>() as u32).collect()
         })
     }
@@ -185,6 +181,15 @@ impl Span {
     fn row(&self, block: usize, nodes: usize) -> usize {
         let of_strips = block.min(MEMBERS * self.extent.strips);
         self.row + of_strips / MEMBERS * strip::NODES + (block - of_strips) * nodes
+    }
+
+    /// The row of places of a node of a block's elements.
+    fn node_row(&self, block: usize, node: usize, nodes: usize) -> usize {
+        let member = block % MEMBERS;
+        match block < MEMBERS * self.extent.strips {
+            true => self.row(block - member, nodes) + STRIP[member][node],
+            false => self.row(block, nodes) + node,
+        }
     }
 }
 
@@ -250,10 +255,7 @@ impl<R: Real + Default> Blocks<R> {
             let (block, member) = (first + in_part, in_part % MEMBERS);
             for (node, n) in given.nodes[e * nodes..][..nodes].iter().enumerate() {
                 let place = (*n as usize * stride::<R>()) as Place;
-                let row = match in_part < MEMBERS * strips {
-                    true => span.row(in_part - member, nodes) + STRIP[member][node],
-                    false => span.row(in_part, nodes) + node,
-                };
+                let row = span.node_row(in_part, node, nodes);
                 let at = &mut self.places.all_mut()[row * lanes + lane];
                 let is_met =
                     in_part < MEMBERS * strips && STRIP[..member].as_flattened().contains(&STRIP[member][node]);

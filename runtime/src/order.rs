@@ -167,8 +167,7 @@ impl Grouped {
         let group = |(k, group): (usize, &[u32])| {
             let nodes = |place: &u32| body.elements[batch.elements[*place as usize] as usize].try_into();
             let nodes = |place: &u32| nodes(place).expect("a tetrahedron has four nodes");
-            let (mut found, alone) = strips(&group.iter().map(nodes).collect::<Vec<_>>());
-            found.sort_unstable_by_key(|strip| strip.each_ref().map(|m| m.element).into_iter().min());
+            let (found, alone) = strips(&group.iter().map(nodes).collect::<Vec<_>>());
             let placed = |m: Member| Member { element: places[k * GROUP + m.element as usize], ..m };
             let alone: Vec<u32> = alone.iter().map(|e| group[*e as usize]).collect();
             (found.into_iter().map(|strip| strip.map(placed)).collect::<Vec<_>>(), alone)

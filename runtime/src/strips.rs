@@ -50,7 +50,8 @@ pub fn reordered(point: &RestPoint<f64>, order: [u8; 4]) -> RestPoint<f64> {
     RestPoint { inverse_jacobian, weight: point.weight }
 }
 
-/// Disjoint strips of some elements, by their nodes, and the elements of none, ascending.
+/// Disjoint strips of some elements, by their nodes, in the order of each strip's least element, and the elements of none,
+/// ascending.
 pub fn strips(elements: &[[u32; 4]]) -> (Vec<[Member; MEMBERS]>, Vec<u32>) {
     let mut graph = Graph::new(elements);
     let mut paths = vec![];
@@ -65,6 +66,7 @@ pub fn strips(elements: &[[u32; 4]]) -> (Vec<[Member; MEMBERS]>, Vec<u32>) {
         }
     }
     graph.alone.sort_unstable();
+    paths.sort_unstable_by_key(|path| path.iter().copied().min());
     (paths.into_iter().map(|path| members(elements, path)).collect(), graph.alone)
 }
 

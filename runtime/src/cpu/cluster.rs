@@ -176,7 +176,6 @@ impl Arranged {
             let nodes = |e: &u32| body.elements[*e as usize].try_into().expect("a tetrahedron has four nodes");
             let elements: Vec<[u32; 4]> = batch.elements[range.clone()].iter().map(nodes).collect();
             (found, _) = strips(&elements);
-            found.sort_unstable_by_key(|strip| strip.each_ref().map(|m| m.element).into_iter().min());
         }
         let blocks = found.len() / lanes;
         let mut is_alone = vec![true; range.len()];

@@ -44,7 +44,8 @@ pub struct GpuField {
     state: Option<GpuVector>,
     gate: Rc<Memory>,
     elements: usize,
-    /// Element passes by law, kind, the stride of constants and what an invocation computes, compiled when first needed: a scene has those of its pairs.
+    /// Element passes by law, kind, the stride of constants and what an invocation computes, compiled when first needed: a
+    /// scene has those of its pairs.
     element_passes: HashMap<(&'static str, &'static str, u32, Pass, Unit), Rc<Compiled>>,
     /// The node passes, by whether they make a product.
     node_passes: HashMap<bool, Rc<Compiled>>,
