@@ -5,6 +5,7 @@
 //! order. To return one, a device has to be waited for; a solver that needs scalars in every iteration keeps them in
 //! [`Backend::Registers`], where the vectors live, and gives its recurrences as [`Update`]s.
 
+use crate::contact::{Contact, Passage};
 use crate::device::DeviceError;
 use crate::mass::{MassMatrix, Masses};
 
@@ -32,6 +33,25 @@ pub trait Scalar:
     fn number(x: f64) -> Self;
     /// `then` where left > right, `otherwise` elsewhere; both are evaluated.
     fn select_greater(left: Self, right: Self, then: Self, otherwise: Self) -> Self;
+    /// The square root of what is not negative.
+    fn sqrt(self) -> Self;
+
+    /// The greater of the two.
+    fn max(self, other: Self) -> Self {
+        Self::select_greater(self, other, self, other)
+    }
+    /// The lesser of the two.
+    fn min(self, other: Self) -> Self {
+        Self::select_greater(self, other, other, self)
+    }
+    /// 1, or -1 where it is negative.
+    fn sign(self) -> Self {
+        Self::select_greater(Self::number(0.0), self, Self::number(-1.0), Self::number(1.0))
+    }
+    /// Its magnitude.
+    fn abs(self) -> Self {
+        self * self.sign()
+    }
 }
 
 impl Scalar for f64 {
@@ -40,6 +60,9 @@ impl Scalar for f64 {
     }
     fn select_greater(left: Self, right: Self, then: Self, otherwise: Self) -> Self {
         if left > right { then } else { otherwise }
+    }
+    fn sqrt(self) -> Self {
+        self.sqrt()
     }
 }
 
@@ -76,6 +99,8 @@ pub trait Backend {
     type Registers;
     /// A matrix over the nodes, the same for each component.
     type Matrix;
+    /// What may touch what.
+    type Contact;
 
     /// A vector of zeros.
     fn zeros(&self) -> Self::Vector;
@@ -145,6 +170,14 @@ pub trait Backend {
         self.axpy(kick, acceleration, v);
         self.axpy(drift, v, u);
     }
+    /// Contact of the body for which the backend was made.
+    fn contact(&self, contact: &Contact) -> Self::Contact;
+    /// What contact does at the end of a step.
+    fn touch(&self, meeting: Meeting<Self>)
+    where
+        Self: Sized;
+    /// The least distance of the surface from an obstacle, where the passages begin; `limit` where it is more than that.
+    fn gap(&self, contact: &Self::Contact, passages: &[Passage<f64>], limit: f64, u: &Self::Vector) -> f64;
     /// The next direction of a conjugate gradient: d = z + b d with b = [`BETA`].
     fn turn(&self, z: &Self::Vector, d: &mut Self::Vector, registers: &Self::Registers);
     /// How many iterations a solver does well to take between two readings of its registers.
@@ -188,6 +221,24 @@ pub struct Advance<'a, B: Backend> {
     pub v: &'a mut B::Vector,
     /// Displacement.
     pub u: &'a mut B::Vector,
+}
+
+/// A step at whose end something may have been met.
+pub struct Meeting<'a, B: Backend> {
+    /// What may touch what.
+    pub contact: &'a B::Contact,
+    /// How the obstacles moved.
+    pub passages: &'a [Passage<f64>],
+    /// The step's length: the displacement has grown by it times the velocity.
+    pub h: f64,
+    /// Lumped masses.
+    pub masses: &'a B::Vector,
+    /// Velocity.
+    pub v: &'a mut B::Vector,
+    /// Displacement.
+    pub u: &'a mut B::Vector,
+    /// Gets the impulses of contact on the nodes added, if they are wanted.
+    pub impulse: Option<&'a mut B::Vector>,
 }
 
 /// The vectors of [`Backend::descend`].

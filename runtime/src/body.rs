@@ -6,6 +6,7 @@ use std::ops::Index;
 
 use tensormass_kernels::{ElementEntry, LawEntry, RestPoint};
 
+use crate::contact::Contact;
 use crate::history::History;
 use crate::mass::MassMatrix;
 
@@ -126,6 +127,8 @@ pub struct Body {
     pub motions: Vec<History>,
     /// Loads other than the elements' own forces.
     pub loads: Vec<Load>,
+    /// What its surface may touch.
+    pub contact: Option<Contact>,
     /// Mass-proportional damping coefficient alpha.
     pub mass_damping: f64,
     /// Stiffness-proportional damping coefficient beta.

@@ -20,6 +20,8 @@ pub struct FrameData {
     pub stresses: Vec<[f64; 9]>,
     /// Strain energy of each element in J.
     pub energies: Vec<f64>,
+    /// Force of contact on each node in N.
+    pub contact: Vec<[f64; 3]>,
 }
 
 /// Writes the frames of a run.
@@ -56,7 +58,8 @@ impl Frames {
     pub fn needs(&self) -> Needs {
         let stresses = self.fields.iter().any(|f| matches!(f, Field::Cauchy | Field::VonMises));
         let energies = self.fields.contains(&Field::EnergyDensity);
-        Needs { displacement: true, reactions: false, energies, stresses }
+        let contact = self.fields.contains(&Field::Contact);
+        Needs { displacement: true, reactions: false, energies, stresses, contact }
     }
 
     /// Writes one frame.
@@ -71,6 +74,7 @@ impl Frames {
             match field {
                 Field::Displacement => points.push(("displacement", 3, data.displacement.as_flattened().to_vec())),
                 Field::Velocity => points.push(("velocity", 3, data.velocity.as_flattened().to_vec())),
+                Field::Contact => points.push(("contact", 3, data.contact.as_flattened().to_vec())),
                 Field::Cauchy => cells.push(("cauchy", 9, data.stresses.as_flattened().to_vec())),
                 Field::VonMises => {
                     let von_mises = data.stresses.iter().map(|s| of_stress(s, StressComponent::VonMises)).collect();

@@ -11,6 +11,7 @@ pub mod backend;
 pub mod body;
 
 pub mod cg;
+pub mod contact;
 pub mod cpu;
 pub mod device;
 mod frames;

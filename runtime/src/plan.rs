@@ -4,11 +4,11 @@ use serde_json::{Value, json};
 use tensormass_kernels::{ElementInfo, LawEntry, LawInfo, pairs};
 
 use crate::body::LawBatch;
-use crate::cpu::place_bytes;
+use crate::cpu::{TOUCHING_BYTES, place_bytes};
 use crate::mesh::Quality;
 use crate::model::Model;
 use crate::order::{DeviceOrder, Sharing, blocks_of_clusters, sharing};
-use crate::scene::{Integrator, Precision, Scene};
+use crate::scene::{Field, Integrator, Precision, Scene};
 use crate::tangent::{self, Tangent, blocks};
 
 /// How buffers are laid out: they differ between the CPU and GPUs.
@@ -113,7 +113,10 @@ impl Plan {
         let slopes: usize = mapped.map(|info| info.points.len() * (info.nodes - 1)).sum();
         let matrix = model.body.mass_matrix.as_ref();
         let (entries, rows) = matrix.map_or((0, 0), |m| (m.values.len(), m.offsets.len()));
-        let vectors = if implicit { 20 + 2 * usize::from(viscous || proportional) } else { 6 };
+        let frames_show = |field| scene.output.frames != Some(0) && scene.output.fields.contains(&field);
+        let impulses = model.body.contact.is_some() && (model.recorder.needs().contact || frames_show(Field::Contact));
+        let touching = model.body.contact.as_ref().map_or(0, |contact| contact.nodes.len());
+        let vectors = if implicit { 20 + 2 * usize::from(viscous || proportional) } else { 6 } + usize::from(impulses);
         let constants: usize = model.body.batches.iter().map(|b| b.constants.len()).sum();
         let with_domain = model.body.batches.iter().filter(|b| b.law.info.domain.is_some());
         let margins: usize = with_domain.map(|b| b.elements.len()).sum();
@@ -151,6 +154,7 @@ impl Plan {
                     ("assembled tangent", assembled),
                     ("state and work vectors", vectors * 3 * real * nodes),
                     ("consistent mass", (4 + real) * entries + 4 * rows),
+                    ("nodes of the surface", TOUCHING_BYTES * touching),
                 ]
             }
             Layout::Gpu => {
@@ -167,6 +171,7 @@ impl Plan {
                     ("margins of domains", 4 * margins),
                     ("state and work vectors", (vectors + 1) * 16 * nodes),
                     ("consistent mass", 8 * entries + 4 * rows),
+                    ("nodes of the surface", 16 * touching),
                 ]
             }
         };
@@ -221,6 +226,9 @@ impl Plan {
             }
         }
         passes.push("nodes: update of the state");
+        if model.body.contact.is_some() {
+            passes.push("nodes of the surface: contact, while an obstacle can be met");
+        }
         let (modelled, left_out) = scope(scene, model, implicit);
         Self { laws, passes, buffers, elements, quality: model.quality, modelled, left_out }
     }
@@ -348,6 +356,13 @@ fn scope(scene: &Scene, model: &Model, implicit: bool) -> (Vec<String>, Vec<Stri
     );
     say(moving, "imposed motion".into(), "imposed motion: no boundary moves");
     say(!model.body.loads.is_empty(), format!("{} loads", model.body.loads.len()), "loads: none given");
-    left_out.push("contact: this version has none".to_string());
+    let contact = model.body.contact.as_ref();
+    say(
+        contact.is_some(),
+        contact.map_or_else(String::new, |c| {
+            format!("contact of {} surface nodes with {} obstacles", c.nodes.len(), c.obstacles.len())
+        }),
+        "contact: no obstacle",
+    );
     (modelled, left_out)
 }

@@ -34,6 +34,8 @@ pub struct Needs {
     pub energies: bool,
     /// Stresses of the elements.
     pub stresses: bool,
+    /// Forces of contact.
+    pub contact: bool,
 }
 
 /// A state in SI units, with what was needed of it.
@@ -47,12 +49,15 @@ pub struct Snapshot {
     pub energies: Energies,
     /// Cauchy stress of each element in Pa.
     pub stresses: Vec<[f64; 9]>,
+    /// Force of contact on each node in N.
+    pub contact: Vec<[f64; 3]>,
 }
 
 #[derive(Debug)]
 enum Reader {
     Displacement { nodes: Vec<u32>, component: Component, statistic: Statistic },
     Reaction { nodes: Vec<u32>, component: Component },
+    Contact { nodes: Vec<u32>, component: Component },
     Modulus { axis: usize, fixed: Vec<u32>, moved: Vec<u32>, area: f64, length: f64 },
     Energy(EnergyPart),
     Volume(Vec<u32>),
@@ -98,6 +103,16 @@ impl Recorder {
                     let nodes = places.nodes(scene, &path("nodes"), nodes)?;
                     supported(&path("nodes"), &nodes)?;
                     Reader::Reaction { nodes, component: *component }
+                }
+                Probe::ContactForce { nodes, component, .. } => {
+                    if scene.obstacle.is_empty() {
+                        return Err(SceneError::at(
+                            scene.locate(&path("kind")),
+                            "there is no contact force to record: the scene has no [[obstacle]]",
+                            "add an [[obstacle]], or record a reaction",
+                        ));
+                    }
+                    Reader::Contact { nodes: places.nodes(scene, &path("nodes"), nodes)?, component: *component }
                 }
                 Probe::ApparentYoungModulus { axis, fixed, moved, .. } => {
                     let fixed = places.nodes(scene, &path("fixed"), fixed)?;
@@ -145,6 +160,7 @@ impl Recorder {
             match reader {
                 Reader::Displacement { .. } | Reader::Volume(_) => needs.displacement = true,
                 Reader::Reaction { .. } => needs.reactions = true,
+                Reader::Contact { .. } => needs.contact = true,
                 Reader::Modulus { .. } => {
                     needs.displacement = true;
                     needs.reactions = true;
@@ -168,6 +184,7 @@ impl Recorder {
                 reduce(values, *statistic)
             }
             Reader::Reaction { nodes, component } => of_vector(total(nodes, &state.reactions), *component),
+            Reader::Contact { nodes, component } => of_vector(total(nodes, &state.contact), *component),
             Reader::Modulus { axis, fixed, moved, area, length } => {
                 let mean = |nodes: &[u32]| mean(nodes, |n| state.displacement[n as usize][*axis]);
                 let strain = (mean(moved) - mean(fixed)) / length;

@@ -1,6 +1,6 @@
 //! A body on a backend: state, masses, loads and imposed motion over time, shared by all integrators.
 
-use crate::backend::{Backend, ForceField, LeftDomain};
+use crate::backend::{Backend, ForceField, LeftDomain, Meeting};
 use crate::body::Body;
 use crate::device::DeviceError;
 use crate::mass::Masses;
@@ -64,7 +64,20 @@ pub struct System<B: Backend, F: ForceField<B>> {
     pub body: Body,
     /// M.
     pub masses: Masses<B>,
+    /// Contact, if there is anything to meet.
+    pub touch: Option<Touch<B>>,
     loads: Vec<B::Vector>,
+}
+
+/// Contact of a body on a backend.
+pub struct Touch<B: Backend> {
+    device: B::Contact,
+    /// Impulses on the nodes since they were last cleared, if they are wanted.
+    pub impulse: Option<B::Vector>,
+    /// Whether steps look for contact: they need not while nothing can be met.
+    pub is_looked_for: bool,
+    /// Steps that looked for contact.
+    pub steps: u64,
 }
 
 /// A body spread over this many of its diameters has diverged: no law of solids means such a stretch, and explicit
@@ -79,7 +92,13 @@ impl<B: Backend, F: ForceField<B>> System<B, F> {
             None => Masses::lumped(backend.upload(&body.masses.iter().map(|&m| [m; 3]).collect::<Vec<_>>())),
         };
         let loads = body.loads.iter().map(|l| backend.upload(&l.forces)).collect();
-        Self { backend, field, body, masses, loads }
+        let touch = body.contact.as_ref().map(|contact| Touch {
+            device: backend.contact(contact),
+            impulse: None,
+            is_looked_for: true,
+            steps: 0,
+        });
+        Self { backend, field, body, masses, touch, loads }
     }
 
     /// The state at rest with this velocity everywhere, imposed components at their time-0 values.
@@ -119,6 +138,33 @@ impl<B: Backend, F: ForceField<B>> System<B, F> {
         }
         if self.body.stiffness_damping != 0.0 {
             self.field.add_dforce_at(&self.backend, u, v, self.body.stiffness_damping, f);
+        }
+    }
+
+    /// What contact does at the end of an explicit step of length h, which the displacement has taken.
+    pub fn meet_obstacles(&mut self, state: &mut State<B>, h: f64) {
+        let (Some(touch), Some(contact)) = (&mut self.touch, &self.body.contact) else { return };
+        if !touch.is_looked_for {
+            return;
+        }
+        touch.steps += 1;
+        self.backend.touch(Meeting {
+            contact: &touch.device,
+            passages: &contact.passages(state.time, state.time + h),
+            h,
+            masses: self.masses.diagonal(),
+            v: &mut state.v,
+            u: &mut state.u,
+            impulse: touch.impulse.as_mut(),
+        });
+    }
+
+    /// The least distance of the surface from an obstacle at a displacement and a time; `limit` where it is more than that,
+    /// or there is none.
+    pub fn gap(&self, u: &B::Vector, time: f64, limit: f64) -> f64 {
+        match (&self.touch, &self.body.contact) {
+            (Some(touch), Some(contact)) => self.backend.gap(&touch.device, &contact.passages(time, time), limit, u),
+            _ => limit,
         }
     }
 

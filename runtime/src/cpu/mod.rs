@@ -2,12 +2,14 @@
 
 mod assembled;
 mod cluster;
+mod contact;
 mod field;
 mod one;
 mod tune;
 mod vectors;
 
 pub use cluster::place_bytes;
+pub use contact::{CpuContact, TOUCHING_BYTES};
 pub use field::CpuField;
 pub use one::One;
 pub use tensormass_kernels::Engine;

@@ -3,8 +3,10 @@
 use rayon::prelude::*;
 
 use super::Precision;
-use crate::backend::{ALPHA, Advance, BETA, Backend, Counts, Descent, REGISTERS, RUNNING, SUM, Update};
+use super::contact::CpuContact;
+use crate::backend::{ALPHA, Advance, BETA, Backend, Counts, Descent, Meeting, REGISTERS, RUNNING, SUM, Update};
 use crate::body::{Body, Constraint};
+use crate::contact::{Contact, Passage};
 use crate::device::DeviceError;
 use crate::mass::MassMatrix;
 use crate::order::{node_places, placed_constraints};
@@ -84,6 +86,7 @@ impl<R: Precision> Backend for CpuBackend<R> {
     type Vector = CpuVector<R>;
     type Registers = [f64; REGISTERS];
     type Matrix = CpuMatrix<R>;
+    type Contact = CpuContact;
 
     fn zeros(&self) -> Self::Vector {
         CpuVector(vec![[R::default(); 3]; self.places.len()])
@@ -273,6 +276,18 @@ impl<R: Precision> Backend for CpuBackend<R> {
                 *u = *u + drift * *v;
             }
         });
+    }
+
+    fn contact(&self, contact: &Contact) -> CpuContact {
+        CpuContact::new(contact, &self.places, R::EPSILON)
+    }
+
+    fn touch(&self, meeting: Meeting<Self>) {
+        meeting.contact.touch(meeting);
+    }
+
+    fn gap(&self, contact: &CpuContact, passages: &[Passage<f64>], limit: f64, u: &Self::Vector) -> f64 {
+        contact.gap(passages, u).min(limit)
     }
 
     fn turn(&self, z: &Self::Vector, d: &mut Self::Vector, registers: &Self::Registers) {

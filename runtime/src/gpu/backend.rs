@@ -7,12 +7,14 @@ use std::collections::HashMap;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use crate::backend::{Backend, Counts, Descent, REGISTERS, RUNNING, Update};
+use crate::backend::{Backend, Counts, Descent, Meeting, REGISTERS, RUNNING, Update};
 use crate::body::{Body, Constraint};
+use crate::contact::{Contact, NUMBERS, Passage};
 use crate::device::DeviceError;
 use crate::mass::MassMatrix;
 use crate::order::{DeviceOrder, placed_constraints};
 
+use super::contact::GpuContact;
 use super::device::Gpu;
 use super::recorder::{Kernel, Memory, Numbers, Recorder};
 use super::shaders::{Access, Argument, GROUP, Operation, update_arguments, update_text};
@@ -131,7 +133,8 @@ impl GpuBackend {
     /// A vector over the body's nodes or its mass matrix is larger than the device can bind, or the device has failed.
     pub fn new(gpu: Arc<Gpu>, body: &Body, options: GpuOptions) -> Result<Self, DeviceError> {
         let options = options.valid();
-        let recorder = Rc::new(Recorder::new(gpu, body.motions.len()));
+        let of_contact = body.contact.as_ref().map_or(0, |contact| NUMBERS * contact.obstacles.len());
+        let recorder = Rc::new(Recorder::new(gpu, body.motions.len() + of_contact));
         let order = DeviceOrder::of(body);
         let places = &order.places;
         // [`Backend::matrix`] cannot refuse it.
@@ -197,7 +200,7 @@ impl GpuBackend {
     }
 
     /// Compiles a module of ours: the numbers of the pass, then its arguments.
-    fn kernel(&self, label: &str, text: &str, arguments: &[Argument]) -> Rc<Kernel> {
+    pub(super) fn kernel(&self, label: &str, text: &str, arguments: &[Argument]) -> Rc<Kernel> {
         let accesses = arguments.iter().map(|(_, _, access)| *access);
         let bindings: Vec<Access> = std::iter::once(Access::Uniform).chain(accesses).collect();
         self.recorder.kernel(label, text, &bindings, &[("work_group_size", GROUP.into())])
@@ -211,12 +214,20 @@ impl GpuBackend {
                 .entry(operation)
                 .or_insert_with(|| self.kernel(&format!("{operation:?}"), &operation.text(), &operation.arguments())),
         );
-        let groups = match operation {
+        match operation {
             // One group adds up all partial sums.
-            Operation::Sum => [1, 1],
-            _ => self.recorder.groups(numbers[0] as usize, GROUP),
-        };
-        self.recorder.dispatch(&kernel, numbers, storage, groups);
+            Operation::Sum => {
+                self.recorder.dispatch(&kernel, numbers, storage, [1, 1]);
+                [1, 1]
+            }
+            _ => self.dispatch_each(&kernel, numbers, storage),
+        }
+    }
+
+    /// Records a kernel over `numbers[0]` things; the groups that it takes.
+    pub(super) fn dispatch_each(&self, kernel: &Kernel, numbers: Numbers, storage: &[&Memory]) -> [u32; 2] {
+        let groups = self.recorder.groups(numbers[0] as usize, GROUP);
+        self.recorder.dispatch(kernel, numbers, storage, groups);
         groups
     }
 
@@ -267,6 +278,7 @@ impl Backend for GpuBackend {
     type Vector = GpuVector;
     type Registers = GpuRegisters;
     type Matrix = GpuMatrix;
+    type Contact = GpuContact;
 
     fn zeros(&self) -> GpuVector {
         let mut x = self.vector();
@@ -429,6 +441,18 @@ impl Backend for GpuBackend {
         let storage = [&registers.0, d, q, preconditioner, x, r, z, &self.partials];
         let groups = self.run(Operation::Descend, self.numbers(0.0), &storage);
         self.sum_is_pending(groups);
+    }
+
+    fn contact(&self, contact: &Contact) -> GpuContact {
+        GpuContact::new(self, contact)
+    }
+
+    fn touch(&self, meeting: Meeting<Self>) {
+        GpuContact::touch(self, meeting);
+    }
+
+    fn gap(&self, contact: &GpuContact, passages: &[Passage<f64>], limit: f64, u: &GpuVector) -> f64 {
+        contact.gap(self, passages, limit, u)
     }
 
     fn turn(&self, z: &GpuVector, d: &mut GpuVector, registers: &GpuRegisters) {

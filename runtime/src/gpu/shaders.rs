@@ -89,7 +89,7 @@ use Access::{Read, Write};
 /// A storage buffer of an operation: name, element type, access.
 pub(super) type Argument = (&'static str, &'static str, Access);
 
-const fn vector(name: &'static str, access: Access) -> Argument {
+pub(super) const fn vector(name: &'static str, access: Access) -> Argument {
     (name, "vec4<f32>", access)
 }
 
@@ -244,6 +244,25 @@ fn term(i: u32) -> f32 {{
         };
         text
     }
+}
+
+/// What a module does with its functions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Frame {
+    /// `each(i)`, for each thing.
+    Each,
+    /// Partial maxima of `term(i)`, at least 0.
+    Greatest,
+}
+
+/// A module of these functions.
+pub(super) fn module(title: &str, arguments: &[Argument], functions: &str, frame: Frame) -> String {
+    let declarations = declarations(1, arguments);
+    let frame = match frame {
+        Frame::Each => EACH.to_string(),
+        Frame::Greatest => format!("{ALWAYS}{MAX_JOINS}{REDUCE}"),
+    };
+    format!("// {title}\n{PRELUDE}{declarations}\n{functions}{frame}")
 }
 
 /// The declarations of storage buffers from this binding on.

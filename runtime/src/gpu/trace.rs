@@ -1,4 +1,4 @@
-//! A solver's recurrences as WGSL: an update runs once on numbers that write down what is done to them.
+//! What is written once for CPUs and GPUs as WGSL: it runs once on numbers that write down what is done to them.
 
 use std::cell::RefCell;
 use std::ops::{Add, Div, Mul, Sub};
@@ -12,10 +12,10 @@ thread_local! {
 
 /// A value of the traced text.
 #[derive(Clone, Copy)]
-struct Traced(usize);
+pub(super) struct Traced(usize);
 
 /// Writes a statement down; the value that it defines.
-fn define(expression: &str) -> Traced {
+pub(super) fn define(expression: &str) -> Traced {
     TRACE.with_borrow_mut(|(text, count)| {
         let value = Traced(*count);
         *text += &format!("    let v{count} = {expression};\n");
@@ -48,6 +48,35 @@ impl Scalar for Traced {
     fn select_greater(left: Self, right: Self, then: Self, otherwise: Self) -> Self {
         define(&format!("select(v{}, v{}, v{} > v{})", otherwise.0, then.0, left.0, right.0))
     }
+
+    fn sqrt(self) -> Self {
+        define(&format!("sqrt(v{})", self.0))
+    }
+}
+
+impl std::fmt::Display for Traced {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "v{}", self.0)
+    }
+}
+
+/// The components of a vector that a text names.
+pub(super) fn components<const N: usize>(vector: &str) -> [Traced; N] {
+    std::array::from_fn(|i| define(&format!("{vector}.{}", ["x", "y", "z", "w"][i])))
+}
+
+/// A vector of values.
+pub(super) fn vector<const N: usize>(values: [Traced; N]) -> String {
+    let values: Vec<String> = values.iter().map(Traced::to_string).collect();
+    format!("vec{N}<f32>({})", values.join(", "))
+}
+
+/// A function: its head, the statements that `body` traces, and the expression that it gives.
+pub(super) fn function(head: &str, body: impl FnOnce() -> String) -> String {
+    TRACE.set((String::new(), 0));
+    let result = body();
+    let (statements, _) = TRACE.take();
+    format!("{head} {{\n{statements}    return {result};\n}}\n")
 }
 
 /// The statements of an update on the storage array `registers`; the sum that it reads is in `sum`.

@@ -1,7 +1,8 @@
 //! Explicit steps: semi-implicit Euler and central differences.
 //!
 //! The elements' damping forces are those of the last velocity that is known, before the step or half a step before: the
-//! schemes stay explicit, and are of first order in these forces.
+//! schemes stay explicit, and are of first order in these forces. Contact is the last thing in a step (Li et al. 2014,
+//! Algorithm 1).
 
 use crate::backend::{Advance, Backend, ForceField};
 use crate::system::{Integrator, SolveError, State, StepReport, System};
@@ -43,6 +44,7 @@ impl<B: Backend, F: ForceField<B>> Integrator<B, F> for SemiImplicitEuler<B> {
             u: &mut state.u,
         });
         impose(system, state, state.time + h, h);
+        system.meet_obstacles(state, h);
         Ok(StepReport { forces: 1, ..StepReport::default() })
     }
 }
@@ -97,6 +99,7 @@ impl<B: Backend, F: ForceField<B>> Integrator<B, F> for CentralDifference<B> {
             u: &mut state.u,
         });
         impose(system, state, state.time + h, h);
+        system.meet_obstacles(state, h);
         Ok(StepReport { forces: 1, ..StepReport::default() })
     }
 }

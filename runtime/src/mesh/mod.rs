@@ -1,6 +1,7 @@
 //! Meshes: elements of any kinds, their groups, incidence, maps and quality, and where they come from.
 
 mod beam;
+mod enclosure;
 mod error;
 pub mod gmsh;
 mod gradients;

@@ -6,6 +6,7 @@
 mod boundary;
 pub(crate) mod loads;
 mod material;
+mod obstacle;
 mod parameters;
 pub(crate) mod place;
 
@@ -115,6 +116,7 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
         _ => mass_matrix.as_ref().map_or_else(|| masses.clone(), MassMatrix::row_sums),
     };
     let loads = loads::loads(scene, &mesh, &places, &scale, &weights)?;
+    let contact = obstacle::contact(scene, &mesh, &constraints, &scale)?;
     let recorder = Recorder::new(scene, &mesh, &places, &constraints)?;
     let velocity = scene.initial.velocity.map(|v| v / scale.velocity());
     let body = Body {
@@ -127,6 +129,7 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
         constraints,
         motions,
         loads,
+        contact,
         mass_damping: scene.solver.mass_damping * scale.time,
         stiffness_damping: scene.solver.stiffness_damping / scale.time,
         diameter: diagonal / scale.length,

@@ -3,8 +3,10 @@
 use super::document::{Document, Node};
 use super::error::{Location, SceneError};
 use super::model::{
-    Boundary, History, Integrator, Load, Mass, Mesh, Parameter, ParameterValue, PerElement, Ramp, SceneData, Solver,
+    Boundary, History, Integrator, Load, Mass, Mesh, Motion, Parameter, ParameterValue, PerElement, Ramp, SceneData,
+    Solver,
 };
+use super::obstacle::{Angle, Friction, Obstacle, Rotate};
 use super::shape::written;
 
 /// Steps of a run, at most.
@@ -29,6 +31,10 @@ pub(super) fn check(data: &SceneData, document: &Document) -> Result<(), SceneEr
     }
     for (i, load) in data.load.iter().enumerate() {
         context.load(load, &format!("load.{i}"))?;
+    }
+    context.unique("obstacle", data.obstacle.iter().map(|obstacle| obstacle.name.as_deref()))?;
+    for (i, obstacle) in data.obstacle.iter().enumerate() {
+        context.obstacle(obstacle, &format!("obstacle.{i}"))?;
     }
     context.solver(&data.solver)?;
     context.moves_without_end(data)?;
@@ -140,20 +146,41 @@ impl Context<'_> {
     fn boundary(&self, boundary: &Boundary, path: &str) -> Result<(), SceneError> {
         match boundary {
             Boundary::Fixed { fix, .. } => self.repeated(fix, &format!("{path}.fix")),
-            Boundary::Moved { motion, .. } => {
-                let axes = [("x", &motion.x), ("y", &motion.y), ("z", &motion.z)];
-                if axes.iter().all(|(_, history)| history.is_none()) {
-                    return Err(SceneError::at(
-                        self.place(&format!("{path}.move")),
-                        format!("`{path}.move` moves nothing"),
-                        "give a history for x, y or z, for example { x = { velocity = 0.1 } }",
-                    ));
-                }
-                axes.iter().try_for_each(|(axis, history)| match history {
-                    Some(History::Ramp(ramp)) => self.ramp(ramp, &format!("{path}.move.{axis}.ramp")),
-                    Some(History::Velocity(_)) | None => Ok(()),
-                })
-            }
+            Boundary::Moved { motion, .. } => self.motion(motion, &format!("{path}.move")),
+        }
+    }
+
+    fn motion(&self, motion: &Motion, path: &str) -> Result<(), SceneError> {
+        let axes = [("x", &motion.x), ("y", &motion.y), ("z", &motion.z)];
+        if axes.iter().all(|(_, history)| history.is_none()) {
+            return Err(SceneError::at(
+                self.place(path),
+                format!("`{path}` moves nothing"),
+                "give a history for x, y or z, for example { x = { velocity = 0.1 } }",
+            ));
+        }
+        axes.iter().try_for_each(|(axis, history)| match history {
+            Some(History::Ramp(ramp)) => self.ramp(ramp, &format!("{path}.{axis}.ramp")),
+            Some(History::Velocity(_)) | None => Ok(()),
+        })
+    }
+
+    fn obstacle(&self, obstacle: &Obstacle, path: &str) -> Result<(), SceneError> {
+        if let Friction::Each { sticking, sliding } = obstacle.friction
+            && sliding > sticking
+        {
+            return Err(SceneError::at(
+                self.place(&format!("{path}.friction.kinetic")),
+                format!("`{path}.friction` has a kinetic coefficient {sliding} above the static one {sticking}"),
+                "what slides is held less than what sticks: exchange the two, or write one number for both",
+            ));
+        }
+        if let Some(motion) = &obstacle.translation {
+            self.motion(motion, &format!("{path}.move"))?;
+        }
+        match &obstacle.rotate {
+            Some(Rotate { angle: Angle::Ramp(ramp), .. }) => self.ramp(ramp, &format!("{path}.rotate.angle.ramp")),
+            Some(Rotate { angle: Angle::Velocity(_), .. }) | None => Ok(()),
         }
     }
 

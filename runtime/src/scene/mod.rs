@@ -14,6 +14,7 @@ mod check;
 mod document;
 mod error;
 mod model;
+mod obstacle;
 mod output;
 mod overrides;
 mod predicate;
@@ -27,6 +28,7 @@ pub use model::{
     About, Axis, Beam, Boundary, ConjugateGradient, History, Initial, Integrator, Load, Mass, Material, Mesh, Motion,
     Newton, Parameter, ParameterValue, PerElement, Precision, Preconditioner, Ramp, SceneData, Solver, TangentChoice,
 };
+pub use obstacle::{Angle, Friction, Obstacle, Rod, Rotate, Shape};
 pub use output::{Component, EnergyPart, Field, Output, Probe, Statistic, StressComponent};
 pub use overrides::Override;
 pub use predicate::{ExpressionError, Predicate};

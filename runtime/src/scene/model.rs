@@ -3,6 +3,7 @@
 //! These types are read by serde, and the JSON schema that checks scene text is made from them; a range written here
 //! is therefore the range that is enforced and the range that is documented. All quantities are in SI units.
 
+use super::obstacle::Obstacle;
 use super::output::{Output, Probe};
 use super::selection::Selection;
 use crate::history::History as Table;
@@ -29,6 +30,9 @@ pub struct SceneData {
     /// Forces from outside.
     #[serde(default)]
     pub load: Vec<Load>,
+    /// What the body's surface cannot enter.
+    #[serde(default)]
+    pub obstacle: Vec<Obstacle>,
     /// The state at time 0; the displacement is zero.
     #[serde(default)]
     pub initial: Initial,

@@ -32,6 +32,17 @@ pub enum Probe {
         /// The component, or the magnitude of the sum.
         component: Component,
     },
+    /// Sum of the forces that obstacles exert on nodes, in N: their mean since the last record.
+    ContactForce {
+        /// The probe's name in the results; unique.
+        #[schemars(length(min = 1))]
+        name: String,
+        /// The nodes.
+        #[serde(default)]
+        nodes: Selection,
+        /// The component, or the magnitude of the sum.
+        component: Component,
+    },
     /// Young's modulus that a traction test shows, in Pa: (axial reaction / area at rest) / (elongation / length).
     ApparentYoungModulus {
         /// The probe's name in the results; unique.
@@ -83,6 +94,7 @@ impl Probe {
         match self {
             Self::Displacement { name, .. }
             | Self::Reaction { name, .. }
+            | Self::ContactForce { name, .. }
             | Self::ApparentYoungModulus { name, .. }
             | Self::Energy { name, .. }
             | Self::Volume { name, .. }
@@ -94,7 +106,7 @@ impl Probe {
     pub fn unit(&self) -> &'static str {
         match self {
             Self::Displacement { .. } => "m",
-            Self::Reaction { .. } => "N",
+            Self::Reaction { .. } | Self::ContactForce { .. } => "N",
             Self::ApparentYoungModulus { .. } | Self::Stress { .. } => "Pa",
             Self::Energy { .. } => "J",
             Self::Volume { .. } => "m3",
@@ -174,6 +186,9 @@ pub enum Field {
     /// Velocity of nodes in m/s.
     #[serde(rename = "velocity")]
     Velocity,
+    /// Force of contact on nodes in N, its mean since the last frame.
+    #[serde(rename = "contact")]
+    Contact,
     /// Cauchy stress of elements in Pa.
     #[serde(rename = "cauchy")]
     Cauchy,

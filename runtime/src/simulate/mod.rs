@@ -1,7 +1,9 @@
 //! Runs a scene: steps a model through time and writes probes, frames and the summary.
 
+mod impulses;
 mod run;
 mod setup;
+mod watch;
 
 use std::path::Path;
 #[cfg(feature = "gpu")]

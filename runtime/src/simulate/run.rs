@@ -16,7 +16,9 @@ use crate::step_limit::{StepLimits, element_limit, power_limit};
 use crate::system::{SolveError, State, StepReport, System};
 use crate::tangent::{ChosenBy, Tangent};
 
+use super::impulses::{Impulses, Record};
 use super::setup::{Stepper, integrator, stepping};
+use super::watch::Watch;
 use super::{Ending, Observer, Outcome, RunError};
 
 /// A run of a scene on a backend.
@@ -32,6 +34,8 @@ pub(super) struct Run<'a, B: Backend, F: ForceField<B>> {
     cost: StepReport,
     pub(super) warnings: Vec<String>,
     limits: Option<StepLimits>,
+    watch: Watch,
+    impulses: Impulses,
     layout: Layout,
     /// How products with the tangent are computed on a CPU, and who chose that.
     pub(super) tangents: Option<(Vec<Tangent>, ChosenBy)>,
@@ -57,6 +61,8 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
             cost: StepReport::default(),
             warnings,
             limits: None,
+            watch: Watch::default(),
+            impulses: Impulses::default(),
             layout,
             tangents: None,
         }
@@ -66,6 +72,12 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
     pub(super) fn all(mut self, out: Option<&Path>, observer: &mut (dyn Observer + Send)) -> Result<Outcome, RunError> {
         let started = Instant::now();
         let mut results = Results::create(self.scene, &self.model, out)?;
+        let of_frames = results.frames.as_ref().is_some_and(|frames| frames.needs().contact);
+        if let Some(touch) = &mut self.system.touch
+            && (of_frames || self.model.recorder.needs().contact)
+        {
+            touch.impulse = Some(self.system.backend.zeros());
+        }
         self.measure_limits(observer);
         for warning in &self.warnings {
             observer.warning(warning);
@@ -107,8 +119,11 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         while self.state.step < self.steps {
             let before = self.state.step;
             let ahead = if before < careful { 1 } else { self.stretch() };
+            self.watch.before(&mut self.system, &self.state, ahead, self.step);
             match if ahead == 1 { self.one_step() } else { self.steps_unseen(ahead) } {
-                Ok(()) => {}
+                Ok(true) => {}
+                // Once more, with contact.
+                Ok(false) => continue,
                 Err(e) if ahead == 1 || matches!(e, SolveError::Device(_)) => return Ok(Ending::Failed(e)),
                 // Once more, to find the step.
                 Err(_) => {
@@ -145,10 +160,13 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         (1..most).find(|ahead| self.is_recorded(self.state.step + ahead)).unwrap_or(most)
     }
 
-    /// Takes a step. After an error the state is the last one that is good.
-    fn one_step(&mut self) -> Result<(), SolveError> {
+    /// Takes a step, and says that it is good. After an error the state is the last one that is.
+    fn one_step(&mut self) -> Result<bool, SolveError> {
         let k = self.state.step + 1;
         let stepped = self.integrator.step(&mut self.system, &mut self.state, self.step);
+        if stepped.is_ok() && self.watch.missed(&mut self.system, &self.state, self.state.time, 1, self.step) {
+            self.system.meet_obstacles(&mut self.state, self.step);
+        }
         // What a failed device did to a solver is not the reason.
         let report = self.system.backend.check().map_err(SolveError::from).and(stepped)?;
         self.passed(k, report);
@@ -157,11 +175,12 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
             // What the device returned of this step is not known to be good.
             self.at(k - 1);
         }
-        bounded
+        bounded.map(|()| true)
     }
 
-    /// Takes some steps without looking at the states between. After an error the state is that before all of them.
-    fn steps_unseen(&mut self, ahead: u64) -> Result<(), SolveError> {
+    /// Takes some steps without looking at the states between; whether they are good, or have to be taken again because they
+    /// may have missed contact. Then, and after an error, the state is that before all of them.
+    fn steps_unseen(&mut self, ahead: u64) -> Result<bool, SolveError> {
         let backend = &self.system.backend;
         let (mut u, mut v) = (backend.zeros(), backend.zeros());
         backend.copy(&self.state.u, &mut u);
@@ -182,7 +201,9 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         self.system.field.defer_domains(false);
         let good = self.system.backend.check().map_err(SolveError::from).and(stepped).and(inside);
         let good = good.and_then(|()| self.system.check_bounded(&self.state));
-        if good.is_err() {
+        let from = self.step * before as f64;
+        let good = good.map(|()| !self.watch.missed(&mut self.system, &self.state, from, ahead, self.step));
+        if !matches!(good, Ok(true)) {
             self.system.backend.copy(&u, &mut self.state.u);
             self.system.backend.copy(&v, &mut self.state.v);
             self.cost = cost;
@@ -272,6 +293,9 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         if needs.stresses {
             snapshot.stresses = self.stresses();
         }
+        if needs.contact {
+            snapshot.contact = self.contact(Record::Probes);
+        }
         self.system.backend.check()?;
         Ok(snapshot)
     }
@@ -285,6 +309,9 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         };
         if needs.stresses {
             data.stresses = self.stresses();
+        }
+        if needs.contact {
+            data.contact = self.contact(Record::Frames);
         }
         if needs.energies {
             let energies = self.system.field.element_energies(&self.system.backend, &self.state.u)?;
@@ -304,6 +331,13 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
             .into_iter()
             .map(|s| s.map(|x| x * stress))
             .collect()
+    }
+
+    /// The mean force of contact on each node since the last record of a kind, in N.
+    fn contact(&mut self, of: Record) -> Vec<[f64; 3]> {
+        let unit = self.model.scale.force();
+        let forces = self.impulses.forces(&mut self.system, of, self.state.time);
+        forces.into_iter().map(|f| f.map(|x| x * unit)).collect()
     }
 
     fn energies(&mut self) -> Result<Energies, LeftDomain> {
@@ -368,6 +402,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
                 "negative_curvatures": self.cost.negative_curvature,
                 "tangents_chosen_by": tangents_by,
             },
+            "contact": self.system.touch.as_ref().map(|touch| json!({ "steps_that_looked": touch.steps })),
             "device_counts": self.device_counts(),
             "units": { "length_m": scale.length, "stress_Pa": scale.stress, "time_s": scale.time },
             "model": plan.to_json(),

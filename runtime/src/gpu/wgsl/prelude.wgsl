@@ -7,6 +7,7 @@ struct Numbers {
     k: u32,
     // A factor.
     a: f32,
-    unused: f32,
+    // Where values of motions begin.
+    base: u32,
 }
 @group(0) @binding(0) var<uniform> numbers: Numbers;

@@ -1,0 +1,50 @@
+//! Contact forces for records: impulses over the time since the last record of the same kind.
+
+use crate::backend::{Backend, ForceField};
+use crate::system::System;
+
+/// Impulses that one kind of record has not seen yet, in scaled units.
+#[derive(Debug, Clone, Default)]
+struct Pending {
+    impulses: Vec<[f64; 3]>,
+    /// When the last record was.
+    since: f64,
+}
+
+/// A kind of record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Record {
+    /// Probes.
+    Probes = 0,
+    /// Frames.
+    Frames = 1,
+}
+
+/// What contact has done since the last records.
+#[derive(Debug, Default)]
+pub(super) struct Impulses([Pending; 2]);
+
+impl Impulses {
+    /// The mean contact force on each node since the last record of a kind, in scaled units; 0 at the beginning.
+    pub(super) fn forces<B: Backend, F: ForceField<B>>(
+        &mut self,
+        system: &mut System<B, F>,
+        of: Record,
+        time: f64,
+    ) -> Vec<[f64; 3]> {
+        let nodes = system.body.masses.len();
+        if let Some(impulse) = system.touch.as_mut().and_then(|touch| touch.impulse.as_mut()) {
+            let new = system.backend.download(impulse);
+            system.backend.clear(impulse);
+            for pending in &mut self.0 {
+                pending.impulses.resize(nodes, [0.0; 3]);
+                pending.impulses.iter_mut().zip(&new).for_each(|(sum, new)| (0..3).for_each(|i| sum[i] += new[i]));
+            }
+        }
+        let Pending { mut impulses, since } = std::mem::take(&mut self.0[of as usize]);
+        self.0[of as usize].since = time;
+        impulses.resize(nodes, [0.0; 3]);
+        let per = if time > since { 1.0 / (time - since) } else { 0.0 };
+        impulses.into_iter().map(|x| x.map(|x| x * per)).collect()
+    }
+}

@@ -1,0 +1,312 @@
+//! Contact with obstacles: shapes, one step's rule, friction on inclines, impacts, bounces, moving obstacles, and when contact
+//! is looked for. CPU, f64 unless it says otherwise; `gpu_contact.rs` repeats what a device may do differently.
+
+#[path = "support/contact.rs"]
+mod falling;
+mod support;
+
+use falling::{BELOW, CUBE, OnCpu, falling, on_cpu};
+use support::{Random, case, done, number, outcome, probe, scene};
+use tensormass_runtime::backend::{Backend, ForceField};
+use tensormass_runtime::contact::{Move, Nearest, Shape, Surface, respond};
+use tensormass_runtime::cpu::Precision;
+use tensormass_runtime::simulate::Outcome;
+use tensormass_runtime::system::System;
+
+const SHAPES: [(&str, Shape); 6] = [
+    ("plane", Shape::Plane),
+    ("sphere", Shape::Capsule { half: 0.0, radius: 0.7 }),
+    ("capsule", Shape::Capsule { half: 0.5, radius: 0.4 }),
+    ("box", Shape::Box { half: [0.6, 0.3, 0.5] }),
+    ("cylinder", Shape::Cylinder { half: 0.4, radius: 0.6 }),
+    ("disc", Shape::Cylinder { half: 0.01, radius: 0.8 }),
+];
+
+/// A point within +-2.
+fn point(rng: &mut Random) -> [f64; 3] {
+    std::array::from_fn(|_| 2.0 * rng.next())
+}
+
+fn length(x: [f64; 3]) -> f64 {
+    x.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+fn along(x: [f64; 3], by: [f64; 3], t: f64) -> [f64; 3] {
+    std::array::from_fn(|i| x[i] + t * by[i])
+}
+
+/// The point of the surface below a point is at distance 0 and as far as the distance says, nothing of the shape is nearer, and
+/// distances grow along the normal; all to rounding.
+#[test]
+fn distances_are_those_of_the_surface() {
+    let mut rng = Random(1);
+    for (name, shape) in SHAPES {
+        for _ in 0..2000 {
+            let x = point(&mut rng);
+            let Nearest { normal, distance } = shape.nearest::<f64>(x);
+            assert!((length(normal) - 1.0).abs() < 1e-14, "{name} at {x:?}: normal {normal:?}");
+            let below = along(x, normal, -distance);
+            let left = shape.nearest::<f64>(below).distance;
+            assert!(left.abs() < 1e-14, "{name} at {x:?}: {below:?} is {left:e} away");
+            // Distances of a convex set are convex and change by no more than the way.
+            let y = point(&mut rng);
+            let (other, middle) =
+                (shape.nearest::<f64>(y).distance, shape.nearest(along(x, along(y, x, -1.0), 0.5)).distance);
+            assert!(middle <= 0.5 * (distance + other) + 1e-15, "{name}: {x:?} to {y:?} is not convex");
+            assert!((distance - other).abs() <= length(along(y, x, -1.0)) + 1e-15, "{name}: {x:?} to {y:?}");
+        }
+    }
+}
+
+/// Any move from outside: the node ends outside, no farther from where it began than without contact, and touched only if its
+/// path or what follows of it meets the obstacle; without friction its move along the surface is kept, with much it stops.
+#[test]
+fn a_response_keeps_out_and_gives_no_energy() {
+    let mut rng = Random(2);
+    let tolerance = 1e-15;
+    for (name, shape) in SHAPES {
+        let (mut met, mut missed) = (0, 0);
+        for _ in 0..4000 {
+            let (from, by) = (point(&mut rng), point(&mut rng));
+            if shape.nearest::<f64>(from).distance < 0.0 {
+                continue;
+            }
+            for friction in [0.0, 0.3, 1e6] {
+                let surface = Surface { sticking: friction, sliding: 0.9 * friction, tolerance };
+                let response = respond(|x| shape.nearest(x), Move { from, by }, surface);
+                assert_eq!(response.push, [0.0; 3], "{name}: nothing was inside");
+                let after = along(by, response.change, 1.0);
+                let end = shape.nearest::<f64>(along(from, after, 1.0)).distance;
+                assert!(end > -1e-14, "{name}: from {from:?} by {by:?} with {friction} ends {end:e} inside");
+                assert!(length(after) <= length(by) * (1.0 + 1e-14), "{name}: {by:?} became {after:?}");
+                let enters =
+                    (0..=1000).any(|k| shape.nearest::<f64>(along(from, by, f64::from(k) * 1e-3)).distance < 0.0);
+                if enters {
+                    assert!(length(response.change) > 0.0, "{name}: from {from:?} by {by:?} goes through");
+                    met += 1;
+                } else if (0..=1000).all(|k| shape.nearest::<f64>(along(from, by, f64::from(k) * 1e-3)).distance > 0.02)
+                {
+                    assert_eq!(response.change, [0.0; 3], "{name}: from {from:?} by {by:?} meets nothing");
+                    missed += 1;
+                }
+                if enters && friction == 1e6 {
+                    assert!(end < 1e-8, "{name}: from {from:?} by {by:?} does not stay where it hit: {end:e}");
+                }
+            }
+        }
+        assert!(met > 100 && missed > 100, "{name}: {met} met, {missed} missed");
+    }
+}
+
+/// A move along a plane and into it: the tangential part keeps what Coulomb leaves of it, in closed form.
+#[test]
+fn friction_is_coulombs() {
+    for (angle, sticking, sliding) in [(0.0, 0.0, 0.0), (0.7, 0.5, 0.4), (2.0, 0.9, 0.9), (4.0, 3.0, 0.5)] {
+        for (tangential, normal) in [(0.3, 0.1), (0.3, 0.5), (0.0, 0.2), (0.2, 0.0)] {
+            let by = [tangential * f64::cos(angle), tangential * f64::sin(angle), -normal];
+            let node = Move { from: [0.4, -0.2, 0.0], by };
+            let surface = Surface { sticking, sliding, tolerance: 1e-15 };
+            let after = along(by, respond(|x| Shape::Plane.nearest(x), node, surface).change, 1.0);
+            let left = if tangential <= sticking * normal { 0.0 } else { tangential - sliding * normal };
+            let wanted = [left * f64::cos(angle), left * f64::sin(angle), 0.0];
+            assert!(
+                length(along(after, wanted, -1.0)) < 1e-15,
+                "{by:?} with {sticking}, {sliding}: {after:?}, not {wanted:?}"
+            );
+        }
+    }
+}
+
+/// A block of 4 x 4 x 2 cm on a floor under gravity that is tilted by an angle towards a direction, both in degrees.
+fn incline(angle: f64, towards: f64, friction: f64) -> String {
+    let (angle, towards) = (angle.to_radians(), towards.to_radians());
+    let g = [angle.sin() * towards.cos(), angle.sin() * towards.sin(), -angle.cos()].map(|x| 9.81 * x);
+    format!(
+        "[mesh]\nbeam = {{ size = [0.04, 0.04, 0.02], cells = [4, 4, 2], origin = [-0.02, -0.02, 0] }}\n[[material]]\n\
+         law = \"neo_hookean\"\ndensity = 1000.0\nparameters = {{ young = 2e5, poisson = 0.3 }}\n[[load]]\n\
+         kind = \"gravity\"\nacceleration = {g:?}\nramp = [[0.0, 0.0], [0.05, 1.0]]\n[[obstacle]]\n\
+         shape = {{ plane = {{ point = [0, 0, 0], normal = [0, 0, 1] }} }}\nfriction = {friction}\n[solver]\n\
+         integrator = \"central-difference\"\nstep = 5e-5\nduration = 0.4\nstiffness_damping = 1e-4\n[[probe]]\nname = \"x\"\n\
+         kind = \"displacement\"\nnodes = \"all\"\ncomponent = \"x\"\n[[probe]]\nname = \"y\"\nkind = \"displacement\"\n\
+         nodes = \"all\"\ncomponent = \"y\"\n[output]\nframes = 0\nprobe_every = 100\n"
+    )
+}
+
+/// INCLINE: a block slides with g (sin - mu cos) to the case's 1 %, from the beginning of the ramp on, whatever the direction;
+/// below the cone's angle it stays: its nodes move by what the block yields, a part of it that weight / Young bounds. What is
+/// damped is strain alone; without that the block, 1.6 % below the cone, chatters and creeps.
+#[test]
+fn inclines() {
+    let expected = case("INCLINE")["expected"].as_array().expect("a list").clone();
+    for c in &expected {
+        let [angle, mu] = ["theta_deg", "mu"].map(|k| number(&c[k]));
+        for towards in [0.0, 33.0, 90.0, 200.0] {
+            let run = done(&scene::<&str>(&incline(angle, towards, mu), &[]));
+            let [x, y] = ["x", "y"].map(|name| probe(&run, name));
+            let direction = towards.to_radians();
+            let (down, aside) = (x * direction.cos() + y * direction.sin(), y * direction.cos() - x * direction.sin());
+            // Constant acceleration after a ramp of .05 s: the ramp's own contributes (.05)^2 / 6 and a speed of .05 / 2.
+            let way = |a: f64| a * (0.05_f64.powi(2) / 6.0 + 0.5 * 0.05 * 0.35 + 0.5 * 0.35_f64.powi(2));
+            let wanted = way(number(&c["a"]));
+            let yields = 4.0 * 1000.0 * 9.81 * 0.02 * 0.02 / 2e5;
+            eprintln!("{angle} deg, mu {mu}, towards {towards}: {down:e} of {wanted:e}, aside {aside:e}");
+            match c["state"].as_str() {
+                Some("slide") => assert!((down - wanted).abs() <= 0.01 * wanted, "{down:e} of {wanted:e}"),
+                _ => assert!(down.abs() <= yields, "sticks, but moved by {down:e}, {yields:e} expected at most"),
+            }
+            assert!(aside.abs() <= 0.002 * wanted + yields, "{aside:e} aside");
+        }
+    }
+}
+
+/// A block that slides: the floor bears its weight across the slope, and friction is mu times that against the motion; the mean
+/// over 10 ms, to 1 % because the block vibrates.
+#[test]
+fn contact_forces_are_those_of_the_floor() {
+    let (mu, angle, weight) = (0.2, 30_f64.to_radians(), 1000.0 * 0.04 * 0.04 * 0.02 * 9.81);
+    let probes = ["x", "y", "z"]
+        .map(|c| format!("[[probe]]\nname = \"force {c}\"\nkind = \"contact_force\"\ncomponent = \"{c}\"\n"));
+    let run = done(&scene::<&str>(&(incline(30.0, 0.0, mu) + &probes.concat()), &["output.probe_every=200"]));
+    let [x, y, z] = ["force x", "force y", "force z"].map(|name| probe(&run, name));
+    let normal = weight * angle.cos();
+    eprintln!("force {x:e}, {y:e}, {z:e}; {:e}, 0, {normal:e} wanted", -mu * normal);
+    assert!((z - normal).abs() <= 0.01 * normal && (x + mu * normal).abs() <= 0.01 * mu * normal, "{x:e}, {z:e}");
+    assert!(y.abs() <= 0.01 * mu * normal, "{y:e}");
+}
+
+/// At the end of each step no node is deeper than 4 roundings of the scene's size, and contact has not raised kinetic energy:
+/// beyond rounding of the sum, some roundings of it.
+fn check_steps<R: Precision>(shape: &str, precision: &str) {
+    let scene = falling(CUBE, shape, "neo_hookean", precision, 5e-5, 0.06);
+    let mut bench = on_cpu::<R>(&scene);
+    let size = bench.size;
+    let (mut touched, epsilon) = (0, bench.system.backend.epsilon());
+    for step in 0..bench.steps {
+        let [before, after] = bench.step();
+        let gap = bench.gap();
+        assert!(gap >= -4.0 * epsilon * size, "{shape}, {precision}, step {step}: {:e} deep", -gap / size);
+        assert!(after <= before * (1.0 + 32.0 * epsilon), "{shape}, {precision}, step {step}: {before:e} to {after:e}");
+        touched += usize::from(after != before);
+    }
+    assert!(touched > 100, "{shape}, {precision}: met in {touched} steps");
+}
+
+#[test]
+fn no_step_ends_inside_or_gains_energy() {
+    for shape in BELOW {
+        check_steps::<f64>(shape, "f64");
+        check_steps::<f32>(shape, "f32");
+    }
+}
+
+/// FALL: first contact within a step of the closed form, t = sqrt (2 gap / g); until then the cube falls as a whole.
+#[test]
+fn falls_meet_the_floor_in_time() {
+    let (step, gap) = (5e-5, 2e-3_f64);
+    let scene = falling(CUBE, BELOW[0], "neo_hookean", "f64", step, 0.03);
+    let mut bench = on_cpu::<f64>(&scene);
+    let mut first = None;
+    while first.is_none() {
+        let [before, after] = bench.step();
+        first = (before != after).then_some(bench.state.step);
+        assert!(bench.state.step < bench.steps, "nothing was met");
+    }
+    let (met, wanted) = (first.unwrap_or(0) as f64 * step, (2.0 * gap / 9.81).sqrt());
+    assert!((met - wanted).abs() <= step, "met at {met} s, closed form {wanted} s");
+}
+
+/// The largest total energy of a bouncing ball of 2 cm, beyond the initial one, as a part of what the fall brings; and its bounces.
+fn excess(step: f64) -> (f64, usize) {
+    let ball = "file = \"tests/data/ball_4.msh\"\nscale = 0.01";
+    let floor = "{ plane = { point = [0, 0, -0.012], normal = [0, 0, 1] } }";
+    let scene = falling(ball, floor, "neo_hookean", "f64", step, 1.0);
+    let mut bench = on_cpu::<f64>(&scene);
+    let energy = |bench: &mut OnCpu<f64>| {
+        let System { backend, field, .. } = &mut bench.system;
+        let elastic = field.potential_energy(backend, &bench.state.u).unwrap_or_else(|e| panic!("{e}"));
+        elastic - bench.system.load_work(&bench.state.u, bench.state.time)
+    };
+    // What it has of kinetic energy when it first meets the floor.
+    let mut fall = 0.0;
+    let (mut worst, mut bounces, mut touching) = (f64::NEG_INFINITY, 0, false);
+    let mut potential = energy(&mut bench);
+    for _ in 0..bench.steps {
+        let [before, after] = bench.step();
+        let next = energy(&mut bench);
+        // The velocity is that of the middle of the step: potential energy there is the mean of both ends.
+        worst = worst.max(after + 0.5 * (potential + next));
+        potential = next;
+        if before != after && !touching {
+            (bounces, touching) = (bounces + 1, true);
+            fall = f64::max(fall, before);
+        }
+        touching &= bench.gap() < 1e-3 * bench.size;
+    }
+    (worst / fall, bounces)
+}
+
+/// After ten bounces total energy is at most 1 % above the initial one, in terms of the fall's energy, and the excess shrinks
+/// with the step.
+#[test]
+fn bounces_give_no_energy() {
+    let [(coarse, bounces), (fine, _)] = [1e-4, 2.5e-5].map(excess);
+    eprintln!("excess {coarse:e} with 1e-4 s, {fine:e} with 2.5e-5 s, {bounces} bounces");
+    assert!(bounces >= 10, "{bounces} bounces");
+    assert!(coarse <= 0.01, "{coarse:e}");
+    assert!(fine <= 0.5 * coarse.max(0.0) + 1e-12, "{fine:e} after {coarse:e}");
+}
+
+fn looked(outcome: &Outcome) -> u64 {
+    outcome.summary["contact"]["steps_that_looked"].as_u64().expect("a number of steps")
+}
+
+/// A run looks for contact only where something can be met, and then ends bit for bit as one that always looks.
+#[test]
+fn contact_is_looked_for_where_it_can_be() {
+    let scene = falling(CUBE, BELOW[1], "st_venant_kirchhoff", "f32", 5e-5, 0.025);
+    let run = done(&scene);
+    let mut bench = on_cpu::<f32>(&scene);
+    for _ in 0..bench.steps {
+        bench.step();
+    }
+    let u = bench.system.backend.download(&bench.state.u);
+    let scale = run.summary["units"]["length_m"].as_f64().expect("a unit");
+    let lowest = u.iter().map(|u| u[2] * scale).fold(f64::INFINITY, f64::min);
+    assert_eq!(probe(&run, "lowest"), lowest);
+    // It falls for .0202 s of .025 s.
+    let steps = looked(&run);
+    eprintln!("looked in {steps} of {} steps", bench.steps);
+    assert!((95..200).contains(&steps), "looked in {steps} of {} steps", bench.steps);
+    let far = falling(
+        CUBE,
+        "{ plane = { point = [0, 0, -1], normal = [0, 0, 1] } }",
+        "st_venant_kirchhoff",
+        "f32",
+        5e-5,
+        0.025,
+    );
+    assert_eq!(looked(&done(&far)), 0);
+}
+
+/// A floor that rises at 5 cm/s takes a cube along, and a wall that turns about it pushes it aside.
+#[test]
+fn moving_obstacles_push() {
+    let text = "[mesh]\nbeam = { size = [0.02, 0.02, 0.02], cells = [2, 2, 2], origin = [-0.01, -0.01, 0.0005] }\n[[material]]\n\
+                law = \"neo_hookean\"\ndensity = 1000.0\nparameters = { young = 1e5, poisson = 0.3 }\n[[obstacle]]\nMOVES\n\
+                [solver]\nintegrator = \"central-difference\"\nstep = 1e-4\nduration = 0.2\nmass_damping = 20\n[[probe]]\n\
+                name = \"x\"\nkind = \"displacement\"\nnodes = \"all\"\ncomponent = \"x\"\n[[probe]]\nname = \"z\"\n\
+                kind = \"displacement\"\nnodes = \"all\"\ncomponent = \"z\"\n[output]\nframes = 0\n";
+    let run = |moves: &str| outcome(&scene::<&str>(&text.replace("MOVES", moves), &[]));
+    let plane = "shape = { plane = { point = [0, 0, 0], normal = [0, 0, 1] } }";
+    // Damped, the cube rests on what pushes it: its lower side is where the floor is, 1 cm up, and it yields to nothing.
+    let risen = probe(&run(&format!("{plane}\nmove = {{ z = {{ velocity = 0.05 }} }}")), "z");
+    assert!((risen - 0.0095).abs() < 2e-4, "risen by {risen}");
+    // A floor that slides below it under friction but without weight drags nothing.
+    let still = probe(&run(&format!("{plane}\nfriction = 1.0\nmove = {{ x = {{ velocity = 0.05 }} }}")), "x");
+    assert_eq!(still, 0.0);
+    // A box beside it, turned about the z axis by a right angle in .2 s, sweeps it away.
+    let wall = "shape = { box = { centre = [0.05, 0.03, 0.01], size = [0.1, 0.02, 0.04] } }\n\
+                rotate = { centre = [-0.02, 0.02, 0], axis = [0, 0, 2], angle = { ramp = [[0, 0], [0.2, -1.5707963267948966]] } }";
+    let swept = probe(&run(wall), "x");
+    assert!(swept < -0.005, "swept by {swept}");
+}
