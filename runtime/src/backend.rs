@@ -5,7 +5,7 @@
 //! order. To return one, a device has to be waited for; a solver that needs scalars in every iteration keeps them in
 //! [`Backend::Registers`], where the vectors live, and gives its recurrences as [`Update`]s.
 
-use crate::contact::{Contact, Passage};
+use crate::contact::{Contact, Held, Passage};
 use crate::device::DeviceError;
 use crate::mass::{MassMatrix, Masses};
 
@@ -130,12 +130,18 @@ pub trait Backend {
     fn dot(&self, x: &Self::Vector, y: &Self::Vector) -> f64;
     /// The largest |x_i|; infinite if a component is not finite.
     fn max_abs(&self, x: &Self::Vector) -> f64;
-    /// Sets the constrained components to 0.
+    /// Sets the constrained components, and what is held of nodes, to 0.
     fn project(&self, x: &mut Self::Vector);
     /// Sets each constrained component to the value of the motion that it follows.
     fn impose(&self, motions: &[f64], x: &mut Self::Vector);
     /// Sets each constrained component of y to the value of the motion that it follows minus the component of x.
     fn impose_change(&self, motions: &[f64], x: &Self::Vector, y: &mut Self::Vector);
+    /// Says which nodes are held on obstacles: as constrained along their normals, or altogether if they stick.
+    fn hold(&mut self, held: &[Held]);
+    /// Sets what is held of nodes to 0, as [`Backend::project`] does besides.
+    fn project_held(&self, x: &mut Self::Vector);
+    /// Gives held nodes their greatest component in all three, so that dividing by it keeps directions.
+    fn even_out(&self, x: &mut Self::Vector);
     /// Replaces components that are not positive by their magnitude, and 0 by 1.
     fn make_positive(&self, x: &mut Self::Vector);
     /// The unit round-off of the backend's precision.

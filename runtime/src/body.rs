@@ -3,6 +3,7 @@
 //! Everything here is in the units of [`crate::scale::Scale`] and in f64; a backend rounds it to its own precision.
 
 use std::ops::Index;
+use std::sync::Arc;
 
 use tensormass_kernels::{ElementEntry, LawEntry, RestPoint};
 
@@ -128,7 +129,7 @@ pub struct Body {
     /// Loads other than the elements' own forces.
     pub loads: Vec<Load>,
     /// What its surface may touch.
-    pub contact: Option<Contact>,
+    pub contact: Option<Arc<Contact>>,
     /// Mass-proportional damping coefficient alpha.
     pub mass_damping: f64,
     /// Stiffness-proportional damping coefficient beta.

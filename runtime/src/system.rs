@@ -159,6 +159,13 @@ impl<B: Backend, F: ForceField<B>> System<B, F> {
         });
     }
 
+    /// Adds impulses to those of contact, if these are wanted.
+    pub fn add_impulses(&mut self, impulses: &[[f64; 3]]) {
+        if let Some(impulse) = self.touch.as_mut().and_then(|touch| touch.impulse.as_mut()) {
+            self.backend.axpy(1.0, &self.backend.upload(impulses), impulse);
+        }
+    }
+
     /// The least distance of the surface from an obstacle at a displacement and a time; `limit` where it is more than that,
     /// or there is none.
     pub fn gap(&self, u: &B::Vector, time: f64, limit: f64) -> f64 {
@@ -230,6 +237,8 @@ pub struct StepReport {
     pub stagnated: u64,
     /// Linear solutions that met a direction of negative curvature.
     pub negative_curvature: u64,
+    /// Steps whose contact had not settled after the last solution.
+    pub unsettled: u64,
 }
 
 impl std::ops::AddAssign for StepReport {
@@ -239,5 +248,6 @@ impl std::ops::AddAssign for StepReport {
         self.newton += o.newton;
         self.stagnated += o.stagnated;
         self.negative_curvature += o.negative_curvature;
+        self.unsettled += o.unsettled;
     }
 }

@@ -7,9 +7,9 @@ mod support;
 
 use std::sync::Arc;
 
-use falling::{BELOW, Bench, CUBE, falling, on_cpu};
+use falling::{BELOW, Bench, CUBE, falling, falling_text, on_cpu};
 use support::gpu::test_device;
-use support::{Random, done};
+use support::{Random, done, scene};
 use tensormass_runtime::backend::{Backend, Meeting};
 use tensormass_runtime::gpu::{Gpu, GpuBackend, GpuField, GpuOptions};
 use tensormass_runtime::scene::Scene;
@@ -146,6 +146,17 @@ fn runs_are_those_of_the_cpu() {
         }
         let looked = device.summary["contact"]["steps_that_looked"].as_u64().expect("a number");
         assert!((98..=220).contains(&looked), "{shape}: looked in {looked} steps");
+    }
+    // Implicit steps, whose held nodes the device projects.
+    for shape in BELOW {
+        let text = falling_text(CUBE, shape, "st_venant_kirchhoff", "f32", 1e-3, 0.04);
+        let scene = scene(&text, &["solver.integrator=implicit-euler", "solver.newton.tolerance=1e-4"]);
+        let (device, cpu) = (run(&gpu, &scene), done(&scene));
+        for ((name, _, value), (_, _, wanted)) in device.probes.iter().zip(&cpu.probes) {
+            eprintln!("{shape}, implicit: {name} {value:e} on the device, {wanted:e} on the CPU");
+            let size = if name == "lowest" { 4e-3 } else { 8e-6 * 9.81 * 2.0 };
+            assert!((value - wanted).abs() <= 1e-3 * size, "{shape}, {name}: {value:e} for {wanted:e}");
+        }
     }
     let far = "{ plane = { point = [0, 0, -1], normal = [0, 0, 1] } }";
     let far = run(&gpu, &falling(CUBE, far, "st_venant_kirchhoff", "f32", 1e-4, 0.03)).summary;

@@ -5,14 +5,17 @@
 //! | `shape` | an obstacle's surface, seen from a point |
 //! | `pose` | where it is over time |
 //! | `rule` | what meeting it does to a node in a step |
+//! | `held` | which nodes an implicit step holds on obstacles |
 //!
 //! All three are independent of devices: a backend runs the rule over the nodes of the surface. Coordinates are relative to
 //! the middle of the body at rest, so that their roundings are those of its size.
 
+mod held;
 mod pose;
 mod rule;
 mod shape;
 
+pub use held::{ATTEMPTS, Attempt, Held, Holding};
 pub use pose::{Pose, RigidMotion, Turn, facing};
 pub use rule::{Move, NUMBERS, Passage, Response, Surface, respond};
 pub use shape::{Nearest, Shape};
@@ -90,6 +93,12 @@ impl Contact {
     pub fn passages(&self, from: f64, to: f64) -> Vec<Passage<f64>> {
         let of = |o: &Obstacle| Passage::between(&o.motion.of(&o.rest, from), &o.motion.of(&o.rest, to));
         self.obstacles.iter().map(of).collect()
+    }
+
+    /// Where a node is, by its number here, when the nodes of the body have these displacements.
+    pub fn place(&self, index: usize, u: &[[f64; 3]]) -> [f64; 3] {
+        let (rest, u) = (self.positions[index], u[self.nodes[index] as usize]);
+        std::array::from_fn(|i| rest[i] + u[i])
     }
 
     /// Distances that are rounding, where numbers have this unit round-off.

@@ -105,6 +105,14 @@ impl<S: Scalar> Passage<S> {
         Move { from: self.local(node.from), by: std::array::from_fn(|i| relative[i] + swept[i]) }
     }
 
+    /// The displacement of a point of space that the obstacle sees moved so.
+    pub fn way(&self, from: [S; 3], seen: [S; 3]) -> [S; 3] {
+        let arm: [S; 3] = std::array::from_fn(|i| from[i] - self.origin[i]);
+        let swept = transposed(&self.turned, arm);
+        let way = self.outside(std::array::from_fn(|i| seen[i] - swept[i]));
+        std::array::from_fn(|i| way[i] + self.moved[i])
+    }
+
     /// A direction of the obstacle's frame after the step, in space.
     pub fn outside(&self, direction: [S; 3]) -> [S; 3] {
         self.after().map(|row| dot(row, direction))
@@ -120,8 +128,8 @@ fn transposed<S: Scalar>(m: &[[S; 3]; 3], x: [S; 3]) -> [S; 3] {
     std::array::from_fn(|j| m[0][j] * x[0] + m[1][j] * x[1] + m[2][j] * x[2])
 }
 
-/// The response to a move, where `nearest` sees the obstacle from a point.
-pub fn respond<S: Scalar>(nearest: impl Fn([S; 3]) -> Nearest<S>, node: Move<S>, surface: Surface<S>) -> Response<S> {
+/// The part of a move after which it meets an obstacle, and what is seen from there: the end, where it does not.
+pub fn meets<S: Scalar>(nearest: impl Fn([S; 3]) -> Nearest<S>, node: Move<S>, tolerance: S) -> (S, Nearest<S>) {
     let [zero, one] = [0.0, 1.0].map(S::number);
     let Move { from, by } = node;
     let at = |t: S| nearest(std::array::from_fn(|i| from[i] + t * by[i]));
@@ -131,9 +139,17 @@ pub fn respond<S: Scalar>(nearest: impl Fn([S; 3]) -> Nearest<S>, node: Move<S>,
         let closing = zero - dot(seen.normal, by);
         let further = seen.distance / S::select_greater(closing, zero, closing, one);
         let next = S::select_greater(closing, zero, (t + further).min(one), one);
-        t = S::select_greater(seen.distance, surface.tolerance, next, t);
+        t = S::select_greater(seen.distance, tolerance, next, t);
         seen = at(t);
     }
+    (t, seen)
+}
+
+/// The response to a move, where `nearest` sees the obstacle from a point.
+pub fn respond<S: Scalar>(nearest: impl Fn([S; 3]) -> Nearest<S>, node: Move<S>, surface: Surface<S>) -> Response<S> {
+    let [zero, one] = [0.0, 1.0].map(S::number);
+    let (t, seen) = meets(nearest, node, surface.tolerance);
+    let by = node.by;
     let gap = S::select_greater(seen.distance, surface.tolerance, seen.distance, zero);
     let rest = by.map(|d| (one - t) * d);
     let inward = zero - dot(seen.normal, rest);

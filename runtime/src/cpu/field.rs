@@ -443,6 +443,8 @@ impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
         }
         self.apply(x);
         let factors = [-operator.stiffness, operator.mass].map(R::from_f64);
+        // x has nothing along what is held: the sum is that of the projected product too.
         registers[SUM] = self.product_at_nodes(backend, factors, operator.masses.diagonal(), x, y);
+        backend.project_held(y);
     }
 }

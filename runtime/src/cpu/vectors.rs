@@ -6,7 +6,7 @@ use super::Precision;
 use super::contact::CpuContact;
 use crate::backend::{ALPHA, Advance, BETA, Backend, Counts, Descent, Meeting, REGISTERS, RUNNING, SUM, Update};
 use crate::body::{Body, Constraint};
-use crate::contact::{Contact, Passage};
+use crate::contact::{Contact, Held, Passage};
 use crate::device::DeviceError;
 use crate::mass::MassMatrix;
 use crate::order::{node_places, placed_constraints};
@@ -48,6 +48,8 @@ pub struct CpuBackend<R> {
     places: Vec<u32>,
     /// By places, ascending.
     constraints: Vec<Constraint>,
+    /// Nodes on obstacles: their places and normals, and whether they stick.
+    held: Vec<(usize, [f64; 3], bool)>,
     precision: std::marker::PhantomData<R>,
 }
 
@@ -56,7 +58,7 @@ impl<R: Precision> CpuBackend<R> {
     pub fn new(body: &Body) -> Self {
         let places = node_places(body);
         let constraints = placed_constraints(body, &places);
-        Self { places, constraints, precision: std::marker::PhantomData }
+        Self { places, constraints, held: vec![], precision: std::marker::PhantomData }
     }
 
     /// Where each node of the body is in a vector.
@@ -185,6 +187,29 @@ impl<R: Precision> Backend for CpuBackend<R> {
     fn project(&self, x: &mut Self::Vector) {
         for c in &self.constraints {
             x.0[c.node as usize][c.component as usize] = R::default();
+        }
+        self.project_held(x);
+    }
+
+    fn hold(&mut self, held: &[Held]) {
+        let place = |held: &Held| (self.places[held.node as usize] as usize, held.normal, held.sticks);
+        self.held = held.iter().map(place).collect();
+    }
+
+    fn project_held(&self, x: &mut Self::Vector) {
+        for (place, normal, sticks) in &self.held {
+            let x = &mut x.0[*place];
+            let along: f64 = x.iter().zip(normal).map(|(x, n)| x.to_f64() * n).sum();
+            for (x, n) in x.iter_mut().zip(normal) {
+                *x = if *sticks { R::default() } else { R::from_f64(x.to_f64() - along * n) };
+            }
+        }
+    }
+
+    fn even_out(&self, x: &mut Self::Vector) {
+        for (place, ..) in &self.held {
+            let greatest = x.0[*place].iter().map(|x| x.to_f64()).fold(0.0, f64::max);
+            x.0[*place] = [R::from_f64(greatest); 3];
         }
     }
 

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use crate::backend::{Backend, Counts, Descent, Meeting, REGISTERS, RUNNING, Update};
 use crate::body::{Body, Constraint};
-use crate::contact::{Contact, NUMBERS, Passage};
+use crate::contact::{Contact, Held, NUMBERS, Passage};
 use crate::device::DeviceError;
 use crate::mass::MassMatrix;
 use crate::order::{DeviceOrder, placed_constraints};
@@ -117,6 +117,9 @@ pub struct GpuBackend {
     constrained: Memory,
     constrained_nodes: usize,
     motions: usize,
+    /// Nodes on obstacles, of which so many are held now.
+    held: Memory,
+    held_nodes: usize,
     partials: Memory,
     gate: Rc<Memory>,
     /// Partial sums that the next update adds up.
@@ -151,6 +154,8 @@ impl GpuBackend {
             constrained: recorder.filled("constrained nodes", &constrained)?,
             constrained_nodes: constrained.len(),
             motions: body.motions.len(),
+            held: recorder.memory("held nodes", 16 * body.contact.as_ref().map_or(0, |c| c.nodes.len()) as u64)?,
+            held_nodes: 0,
             partials: recorder.memory("partial sums", 4 * partials as u64)?,
             gate: Rc::new(recorder.filled("a gate", &open_gate())?),
             recorder,
@@ -368,6 +373,31 @@ impl Backend for GpuBackend {
 
     fn project(&self, x: &mut GpuVector) {
         self.each(Operation::Project, 0.0, &[&x.memory]);
+        self.project_held(x);
+    }
+
+    fn hold(&mut self, held: &[Held]) {
+        let node = |held: &Held| {
+            let [x, y, z] = held.normal.map(|x| if held.sticks { 0 } else { (x as f32).to_bits() });
+            [x, y, z, self.order.places[held.node as usize]]
+        };
+        let content: Vec<[u32; 4]> = held.iter().map(node).collect();
+        self.held_nodes = content.len();
+        if !content.is_empty() {
+            self.recorder.write(&self.held, &content);
+        }
+    }
+
+    fn project_held(&self, x: &mut GpuVector) {
+        if self.held_nodes > 0 {
+            self.run(Operation::ProjectHeld, [self.held_nodes as u32, 0, 0, 0], &[&self.held, &x.memory]);
+        }
+    }
+
+    fn even_out(&self, x: &mut GpuVector) {
+        if self.held_nodes > 0 {
+            self.run(Operation::EvenOut, [self.held_nodes as u32, 0, 0, 0], &[&self.held, &x.memory]);
+        }
     }
 
     fn impose(&self, motions: &[f64], x: &mut GpuVector) {

@@ -437,6 +437,8 @@ impl ForceField<GpuBackend> for GpuField {
                 }
             }
         }
+        // x has nothing along what is held: the sum is that of the projected product too.
+        backend.project_held(y);
         let groups = self.recorder.groups(backend.nodes(), self.work_group_size);
         backend.sum_is_pending(groups);
     }

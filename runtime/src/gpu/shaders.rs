@@ -32,6 +32,10 @@ pub(super) enum Operation {
     Divide,
     /// Constrained components = 0: y.
     Project,
+    /// What is held of nodes = 0: held, y.
+    ProjectHeld,
+    /// The components of held nodes become the greatest of them: held, y.
+    EvenOut,
     /// Components that are not positive become their magnitude, 0 becomes 1: y.
     MakePositive,
     /// Constrained components = values: constrained, values, y.
@@ -53,7 +57,7 @@ pub(super) enum Operation {
 }
 
 /// All operations.
-pub(super) const OPERATIONS: [Operation; 17] = [
+pub(super) const OPERATIONS: [Operation; 19] = [
     Operation::Copy,
     Operation::Axpy,
     Operation::Xpby,
@@ -62,6 +66,8 @@ pub(super) const OPERATIONS: [Operation; 17] = [
     Operation::Product,
     Operation::Divide,
     Operation::Project,
+    Operation::ProjectHeld,
+    Operation::EvenOut,
     Operation::MakePositive,
     Operation::Impose,
     Operation::ImposeChange,
@@ -102,6 +108,9 @@ const ENTRIES: Argument = ("entries", "f32", Read);
 /// A constrained node, and the motions that its three components follow.
 const CONSTRAINED: Argument = ("constrained", "vec4<u32>", Read);
 
+/// A held node: the bits of its normal, which is 0 where it sticks, and its place.
+const HELD: Argument = ("held", "vec4<u32>", Read);
+
 /// The terms of sums and maxima that nothing stops.
 const ALWAYS: &str = "fn stopped() -> bool {\n    return false;\n}\n";
 const SUM_JOINS: &str = "fn joined(a: f32, b: f32) -> f32 {\n    return a + b;\n}\n";
@@ -124,6 +133,7 @@ impl Operation {
         match self {
             Self::Copy | Self::Axpy | Self::Xpby => vec![x, y],
             Self::Scale | Self::Project | Self::MakePositive => vec![y],
+            Self::ProjectHeld | Self::EvenOut => vec![HELD, y],
             Self::MultiplyAdd => vec![d, x, y],
             Self::Product => vec![OFFSETS, COLUMNS, ENTRIES, x, y, ("gate", "f32", Read)],
             Self::Divide => vec![x, d, y],
@@ -174,6 +184,22 @@ impl Operation {
             Self::Divide => update("x[i].xyz / d[i].xyz"),
             Self::Project => update(
                 "select(old.xyz, vec3<f32>(0.0f), (vec3<u32>(u32(old.w)) & vec3<u32>(1u, 2u, 4u)) != vec3<u32>(0u))",
+            ),
+            Self::ProjectHeld => format!(
+                "fn each(i: u32) {{
+    let normal = bitcast<vec3<f32>>(held[i].xyz);
+    let old = y[held[i].w];
+    let kept = select(vec3<f32>(0.0f), old.xyz - dot(normal, old.xyz) * normal, any(normal != vec3<f32>(0.0f)));
+    y[held[i].w] = vec4<f32>(kept, old.w);
+}}
+{EACH}"
+            ),
+            Self::EvenOut => format!(
+                "fn each(i: u32) {{
+    let old = y[held[i].w];
+    y[held[i].w] = vec4<f32>(vec3<f32>(max(max(old.x, old.y), old.z)), old.w);
+}}
+{EACH}"
             ),
             Self::MakePositive => update("select(vec3<f32>(1.0f), abs(old.xyz), abs(old.xyz) > vec3<f32>(0.0f))"),
             Self::Impose => format!(

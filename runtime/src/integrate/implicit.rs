@@ -3,8 +3,14 @@
 //! Damping forces of the elements are those of the velocity at the end of the step and of the strain at its beginning.
 //! They are then the derivative of h D by the velocity, so that each step still minimises a potential (its matrix is
 //! symmetric), and dissipate whatever the step; the lag is of the order of the scheme.
+//!
+//! Where something can be met, a step is solved with the nodes that are on obstacles held there, until those are the right
+//! ones ([`crate::contact::Holding`]).
+
+use std::sync::Arc;
 
 use crate::backend::{Backend, ForceField};
+use crate::contact::{ATTEMPTS, Attempt, Contact, Held, Holding};
 use crate::system::{Integrator, SolveError, State, StepReport, System};
 
 use super::newton::{Equation, Newton, SolverSettings};
@@ -18,30 +24,62 @@ pub struct ImplicitEuler<B: Backend> {
     newton: Newton<B>,
     settings: SolverSettings,
     dv: B::Vector,
-    damping: B::Vector,
+    /// Impulses that do not depend on dV: mass damping of V, friction.
+    constant: B::Vector,
+    holding: Holding,
 }
 
 impl<B: Backend> ImplicitEuler<B> {
     /// Work vectors for a body of this many nodes.
     pub fn new(backend: &B, nodes: usize, settings: SolverSettings) -> Self {
-        Self { newton: Newton::new(backend, nodes), settings, dv: backend.zeros(), damping: backend.zeros() }
+        Self {
+            newton: Newton::new(backend, nodes),
+            settings,
+            dv: backend.zeros(),
+            constant: backend.zeros(),
+            holding: Holding::default(),
+        }
     }
-}
 
-impl<B: Backend, F: ForceField<B>> Integrator<B, F> for ImplicitEuler<B> {
-    fn step(&mut self, system: &mut System<B, F>, state: &mut State<B>, h: f64) -> Result<StepReport, SolveError> {
+    /// Solves for dV with these nodes held, whose velocities are given; and what holds each node, if any is held.
+    fn solve<F: ForceField<B>>(
+        &mut self,
+        system: &mut System<B, F>,
+        state: &State<B>,
+        h: f64,
+        held: &[Held],
+        v: &[[f64; 3]],
+    ) -> Result<(StepReport, Vec<[f64; 3]>), SolveError> {
         let alpha = system.body.mass_damping;
         let end = state.time + h;
         // Imposed components: the velocity that takes them to their place at the end of the step, minus the old one.
         let (now, target) = (system.body.motions_at(state.time), system.body.motions_at(end));
         let velocity: Vec<f64> = now.iter().zip(&target).map(|(a, b)| (b - a) / h).collect();
+        system.backend.hold(held);
         let backend = &system.backend;
         backend.clear(&mut self.dv);
-        backend.impose_change(&velocity, &state.v, &mut self.dv);
-        if alpha != 0.0 {
-            backend.clear(&mut self.damping);
-            system.masses.add(backend, -h * alpha, &state.v, &mut self.damping);
+        let has_constant = alpha != 0.0 || held.iter().any(|held| held.friction != [0.0; 3]);
+        if has_constant {
+            backend.clear(&mut self.constant);
         }
+        if alpha != 0.0 {
+            system.masses.add(backend, -h * alpha, &state.v, &mut self.constant);
+        }
+        if !held.is_empty() {
+            let (mut change, mut friction) = (vec![[0.0; 3]; v.len()], vec![[0.0; 3]; v.len()]);
+            for held in held {
+                let node = held.node as usize;
+                let to: [f64; 3] = std::array::from_fn(|i| held.target[i] / h - v[node][i]);
+                let along: f64 = to.iter().zip(held.normal).map(|(x, n)| x * n).sum();
+                change[node] = if held.sticks { to } else { held.normal.map(|n| along * n) };
+                friction[node] = held.friction;
+            }
+            backend.axpy(1.0, &backend.upload(&change), &mut self.dv);
+            if has_constant {
+                backend.axpy(1.0, &backend.upload(&friction), &mut self.constant);
+            }
+        }
+        backend.impose_change(&velocity, &state.v, &mut self.dv);
         let equation = Equation {
             mass: 1.0 + h * alpha,
             stiffness: h * h,
@@ -50,15 +88,71 @@ impl<B: Backend, F: ForceField<B>> Integrator<B, F> for ImplicitEuler<B> {
             time: end,
             u: &state.u,
             velocity: Some(&state.v),
-            constant: (alpha != 0.0).then_some(&self.damping),
+            constant: has_constant.then_some(&self.constant),
             viscous: system.body.is_viscous(),
             stiffness_damping: system.body.stiffness_damping,
         };
         let report = self.newton.solve(system, &equation, &mut self.dv, &self.settings)?;
+        let holding = if held.is_empty() { vec![] } else { self.newton.holding(system, &equation, &self.dv)? };
+        Ok((report, holding))
+    }
+
+    /// Solves for dV with the nodes held that have to be.
+    fn solve_with_contact<F: ForceField<B>>(
+        &mut self,
+        system: &mut System<B, F>,
+        state: &State<B>,
+        h: f64,
+        contact: &Contact,
+    ) -> Result<StepReport, SolveError> {
+        let passages = contact.passages(state.time, state.time + h);
+        let tolerance = contact.tolerance(system.backend.epsilon());
+        let [u, v] = [&state.u, &state.v].map(|x| system.backend.download(x));
+        let mut holding = std::mem::take(&mut self.holding);
+        holding.begin(contact, &passages, &u, tolerance);
+        let mut report = StepReport::default();
+        for attempt in 1..=ATTEMPTS {
+            let (cost, mut impulses) = self.solve(system, state, h, holding.held(), &v)?;
+            report += cost;
+            let dv = system.backend.download(&self.dv);
+            let way = |(v, dv): (&[f64; 3], &[f64; 3])| std::array::from_fn(|i| h * (v[i] + dv[i]));
+            let by: Vec<[f64; 3]> = v.iter().zip(&dv).map(way).collect();
+            impulses.resize(v.len(), [0.0; 3]);
+            let mut total = vec![[0.0; 3]; v.len()];
+            for held in holding.held() {
+                let node = held.node as usize;
+                total[node] = std::array::from_fn(|i| impulses[node][i] + held.friction[i]);
+            }
+            let goes_on = holding.look(contact, &passages, &Attempt { u: &u, by: &by, impulses: &impulses }, tolerance);
+            if !goes_on || attempt == ATTEMPTS {
+                report.unsettled += u64::from(goes_on);
+                system.add_impulses(&total);
+                break;
+            }
+        }
+        self.holding = holding;
+        Ok(report)
+    }
+}
+
+impl<B: Backend, F: ForceField<B>> Integrator<B, F> for ImplicitEuler<B> {
+    fn step(&mut self, system: &mut System<B, F>, state: &mut State<B>, h: f64) -> Result<StepReport, SolveError> {
+        let looks = system.touch.as_ref().is_some_and(|touch| touch.is_looked_for);
+        let report = match system.body.contact.as_ref().filter(|_| looks).map(Arc::clone) {
+            Some(contact) => {
+                let solved = self.solve_with_contact(system, state, h, &contact);
+                system.backend.hold(&[]);
+                solved?
+            }
+            None => self.solve(system, state, h, &[], &[])?.0,
+        };
+        let target = system.body.motions_at(state.time + h);
         let backend = &system.backend;
         backend.axpy(1.0, &self.dv, &mut state.v);
         backend.axpy(h, &state.v, &mut state.u);
         backend.impose(&target, &mut state.u);
+        // What rounding left, and what did not settle.
+        system.meet_obstacles(state, h);
         Ok(report)
     }
 }

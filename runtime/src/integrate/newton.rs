@@ -85,6 +85,20 @@ impl<B: Backend> Equation<'_, B> {
         damped: &mut Option<Damped<B>>,
         r: &mut B::Vector,
     ) -> Result<(), LeftDomain> {
+        self.imbalance(system, u, x, damped, r)?;
+        system.backend.project(r);
+        Ok(())
+    }
+
+    /// The residual with what holds the constrained components.
+    fn imbalance<F: ForceField<B>>(
+        &self,
+        system: &mut System<B, F>,
+        u: &B::Vector,
+        x: Option<&B::Vector>,
+        damped: &mut Option<Damped<B>>,
+        r: &mut B::Vector,
+    ) -> Result<(), LeftDomain> {
         system.force(u, self.time, r)?;
         if let (Some(x), Some(Damped { rate, .. })) = (x, damped) {
             system.backend.copy(x, rate);
@@ -101,7 +115,6 @@ impl<B: Backend> Equation<'_, B> {
         if let (Some(x), true) = (x, self.mass != 0.0) {
             system.masses.add(backend, -self.mass, x, r);
         }
-        backend.project(r);
         Ok(())
     }
 }
@@ -222,6 +235,18 @@ impl<B: Backend> Newton<B> {
         unreachable!("the last iteration returns")
     }
 
+    /// What holds each node at x: the imbalance with its sign changed, 0 where nothing is held.
+    pub fn holding<F: ForceField<B>>(
+        &mut self,
+        system: &mut System<B, F>,
+        equation: &Equation<B>,
+        x: &B::Vector,
+    ) -> Result<Vec<[f64; 3]>, LeftDomain> {
+        equation.displaced(&system.backend, x, &mut self.u);
+        equation.imbalance(system, &self.u, Some(x), &mut self.damped, &mut self.residual)?;
+        Ok(system.backend.download(&self.residual).into_iter().map(|r| r.map(|x| -x)).collect())
+    }
+
     /// x += the largest of increment, increment/2, .. that stays in the domain and lowers the residual.
     fn backtrack<F: ForceField<B>>(
         &mut self,
@@ -308,6 +333,7 @@ impl<B: Backend> Newton<B> {
             }
         }
         backend.make_positive(diagonal);
+        backend.even_out(diagonal);
     }
 
     /// Solves A increment = residual at the prepared state.

@@ -10,6 +10,8 @@ mod obstacle;
 mod parameters;
 pub(crate) mod place;
 
+use std::sync::Arc;
+
 use tensormass_kernels::{ElementEntry, RestPoint};
 
 use crate::body::{Body, Rows};
@@ -129,7 +131,7 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
         constraints,
         motions,
         loads,
-        contact,
+        contact: contact.map(Arc::new),
         mass_damping: scene.solver.mass_damping * scale.time,
         stiffness_damping: scene.solver.stiffness_damping / scale.time,
         diameter: diagonal / scale.length,

@@ -22,9 +22,10 @@ pub fn contact(
     if scene.obstacle.is_empty() {
         return Ok(None);
     }
-    if !scene.solver.integrator.is_explicit() {
-        let reason = "contact needs an explicit integrator";
-        let remedy = "choose \"central-difference\" or \"semi-implicit-euler\", or leave out the [[obstacle]]";
+    if scene.solver.integrator == scene::Integrator::Static {
+        let reason = "contact needs an integrator that steps through time";
+        let remedy =
+            "choose \"implicit-euler\" with damping and enough time to come to rest, or leave out the [[obstacle]]";
         return Err(SceneError::at(scene.locate("solver.integrator"), reason, remedy));
     }
     let [low, high] = mesh.bounding_box();

@@ -163,9 +163,19 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
     /// Takes a step, and says that it is good. After an error the state is the last one that is.
     fn one_step(&mut self) -> Result<bool, SolveError> {
         let k = self.state.step + 1;
-        let stepped = self.integrator.step(&mut self.system, &mut self.state, self.step);
+        let explicit = self.scene.solver.integrator.is_explicit();
+        let may_miss = self.system.touch.as_ref().is_some_and(|touch| !touch.is_looked_for);
+        let before = (may_miss && !explicit).then(|| self.copies());
+        let mut stepped = self.integrator.step(&mut self.system, &mut self.state, self.step);
         if stepped.is_ok() && self.watch.missed(&mut self.system, &self.state, self.state.time, 1, self.step) {
-            self.system.meet_obstacles(&mut self.state, self.step);
+            match before {
+                // Contact is the last thing in an explicit step.
+                None => self.system.meet_obstacles(&mut self.state, self.step),
+                Some(before) => {
+                    self.restore(&before);
+                    stepped = self.integrator.step(&mut self.system, &mut self.state, self.step);
+                }
+            }
         }
         // What a failed device did to a solver is not the reason.
         let report = self.system.backend.check().map_err(SolveError::from).and(stepped)?;
@@ -181,10 +191,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
     /// Takes some steps without looking at the states between; whether they are good, or have to be taken again because they
     /// may have missed contact. Then, and after an error, the state is that before all of them.
     fn steps_unseen(&mut self, ahead: u64) -> Result<bool, SolveError> {
-        let backend = &self.system.backend;
-        let (mut u, mut v) = (backend.zeros(), backend.zeros());
-        backend.copy(&self.state.u, &mut u);
-        backend.copy(&self.state.v, &mut v);
+        let copies = self.copies();
         let (before, cost) = (self.state.step, self.cost);
         self.system.field.defer_domains(true);
         let mut stepped = Ok(());
@@ -204,12 +211,26 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         let from = self.step * before as f64;
         let good = good.map(|()| !self.watch.missed(&mut self.system, &self.state, from, ahead, self.step));
         if !matches!(good, Ok(true)) {
-            self.system.backend.copy(&u, &mut self.state.u);
-            self.system.backend.copy(&v, &mut self.state.v);
+            self.restore(&copies);
             self.cost = cost;
             self.at(before);
         }
         good
+    }
+
+    /// Displacement and velocity, to come back to.
+    fn copies(&self) -> [B::Vector; 2] {
+        let backend = &self.system.backend;
+        [&self.state.u, &self.state.v].map(|x| {
+            let mut copy = backend.zeros();
+            backend.copy(x, &mut copy);
+            copy
+        })
+    }
+
+    fn restore(&mut self, [u, v]: &[B::Vector; 2]) {
+        self.system.backend.copy(u, &mut self.state.u);
+        self.system.backend.copy(v, &mut self.state.v);
     }
 
     fn passed(&mut self, step: u64, report: StepReport) {
@@ -400,6 +421,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
                 "newton_iterations": self.cost.newton,
                 "stagnated_solutions": self.cost.stagnated,
                 "negative_curvatures": self.cost.negative_curvature,
+                "unsettled_contacts": self.cost.unsettled,
                 "tangents_chosen_by": tangents_by,
             },
             "contact": self.system.touch.as_ref().map(|touch| json!({ "steps_that_looked": touch.steps })),

@@ -3,10 +3,11 @@
 
 use tensormass_runtime::backend::{Backend, ForceField};
 use tensormass_runtime::body::Body;
+use tensormass_runtime::cg::CgLimits;
 use tensormass_runtime::cpu::{CpuBackend, CpuField, Precision};
-use tensormass_runtime::integrate::CentralDifference;
+use tensormass_runtime::integrate::{CentralDifference, ImplicitEuler, NewtonLimits, SolverSettings};
 use tensormass_runtime::model::{Model, build};
-use tensormass_runtime::scene::Scene;
+use tensormass_runtime::scene::{Preconditioner, Scene};
 use tensormass_runtime::system::{Integrator, State, System};
 
 use crate::support::scene;
@@ -15,16 +16,20 @@ use crate::support::scene;
 pub const CUBE: &str = "beam = { size = [0.02, 0.02, 0.02], cells = [3, 3, 3], origin = [-0.01, -0.01, 0] }";
 
 /// A body that falls on a shape below it.
-pub fn falling(body: &str, shape: &str, law: &str, precision: &str, step: f64, duration: f64) -> Scene {
-    let text = format!(
+pub fn falling_text(body: &str, shape: &str, law: &str, precision: &str, step: f64, duration: f64) -> String {
+    format!(
         "[mesh]\n{body}\n[[material]]\n\
          law = \"{law}\"\ndensity = 1000.0\nparameters = {{ young = 3e4, poisson = 0.3 }}\n[[load]]\n\
          kind = \"gravity\"\nacceleration = [0, 0, -9.81]\n[[obstacle]]\nshape = {shape}\nfriction = 0.2\n[solver]\n\
          integrator = \"central-difference\"\nstep = {step:e}\nduration = {duration:e}\nprecision = \"{precision}\"\n[[probe]]\n\
          name = \"lowest\"\nkind = \"displacement\"\nnodes = \"all\"\ncomponent = \"z\"\nstatistic = \"min\"\n[[probe]]\n\
          name = \"energy\"\nkind = \"energy\"\npart = \"total\"\n[output]\nframes = 0\nprobe_every = 100\n"
-    );
-    scene::<&str>(&text, &[])
+    )
+}
+
+/// As [`falling_text`], read.
+pub fn falling(body: &str, shape: &str, law: &str, precision: &str, step: f64, duration: f64) -> Scene {
+    scene::<&str>(&falling_text(body, shape, law, precision, step, duration), &[])
 }
 
 /// Obstacles whose highest point is 2 mm below the cube.
@@ -40,7 +45,7 @@ pub const BELOW: [&str; 5] = [
 pub struct Bench<B: Backend, F: ForceField<B>> {
     pub system: System<B, F>,
     pub state: State<B>,
-    integrator: CentralDifference<B>,
+    integrator: Box<dyn Integrator<B, F>>,
     h: f64,
     pub steps: u64,
     /// Of the scene, scaled.
@@ -59,7 +64,19 @@ pub fn on_cpu<R: Precision>(scene: &Scene) -> OnCpu<R> {
     })
 }
 
-impl<B: Backend, F: ForceField<B>> Bench<B, F> {
+/// One on the CPU that takes implicit steps, whatever the scene says.
+pub fn implicit(scene: &Scene) -> OnCpu<f64> {
+    let mut bench = on_cpu(scene);
+    let settings = SolverSettings {
+        cg: CgLimits { tolerance: 1e-10, max_iterations: 2000 },
+        preconditioner: Preconditioner::Jacobi,
+        newton: NewtonLimits { tolerance: 1e-8, max_iterations: 30 },
+    };
+    bench.integrator = Box::new(ImplicitEuler::new(&bench.system.backend, bench.system.body.masses.len(), settings));
+    bench
+}
+
+impl<B: Backend + 'static, F: ForceField<B> + 'static> Bench<B, F> {
     /// A scene with an obstacle at its beginning.
     pub fn new(scene: &Scene, on: impl FnOnce(&Body) -> (B, F)) -> Self {
         let Model { body, scale, velocity, .. } = build(scene).unwrap_or_else(|e| panic!("{e}"));
@@ -67,7 +84,7 @@ impl<B: Backend, F: ForceField<B>> Bench<B, F> {
         let size = body.contact.as_ref().expect("an obstacle").size;
         let system = System::new(backend, field, body);
         let state = system.initial_state(velocity);
-        let integrator = CentralDifference::new(&system.backend);
+        let integrator = Box::new(CentralDifference::new(&system.backend));
         let h = scene.solver.step.expect("a step") / scale.time;
         Self { system, state, integrator, h, steps: scene.solver.steps(), size }
     }
@@ -77,7 +94,14 @@ impl<B: Backend, F: ForceField<B>> Bench<B, F> {
         self.system.gap(&self.state.u, self.state.time, self.size)
     }
 
-    /// A step; kinetic energy before and after contact.
+    /// A step with its contact.
+    pub fn step_whole(&mut self) {
+        self.integrator.step(&mut self.system, &mut self.state, self.h).unwrap_or_else(|e| panic!("{e}"));
+        self.state.step += 1;
+        self.state.time = self.h * self.state.step as f64;
+    }
+
+    /// An explicit step; kinetic energy before and after contact.
     pub fn step(&mut self) -> [f64; 2] {
         self.system.touch.as_mut().expect("an obstacle").is_looked_for = false;
         self.integrator.step(&mut self.system, &mut self.state, self.h).unwrap_or_else(|e| panic!("{e}"));
