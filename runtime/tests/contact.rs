@@ -6,7 +6,7 @@ mod falling;
 mod support;
 
 use falling::{BELOW, CUBE, OnCpu, falling, implicit, on_cpu};
-use support::{Random, case, done, number, outcome, probe, scene};
+use support::{Random, case, done, number, outcome, probe, repository, scene};
 use tensormass_runtime::backend::{Backend, ForceField};
 use tensormass_runtime::contact::{Move, Nearest, Shape, Surface, respond};
 use tensormass_runtime::cpu::Precision;
@@ -240,6 +240,45 @@ fn falls_meet_the_floor_in_time() {
     }
     let (met, wanted) = (first.unwrap_or(0) as f64 * step, (2.0 * gap / 9.81).sqrt());
     assert!((met - wanted).abs() <= step, "met at {met} s, closed form {wanted} s");
+}
+
+/// TORUS_2014 as the scene of the repository has it: the case's time of first contact to one step, that of most compression to
+/// 5 %; the least height and the greatest width by then to 2 %, because the case's mesh cuts its cells another way.
+#[test]
+fn the_torus_falls_as_the_papers() {
+    let wanted = &case("TORUS_2014")["expected"]["sim_E3000"];
+    let scene =
+        tensormass_runtime::scene::load(repository("scenes/torus-drop.toml"), &[]).unwrap_or_else(|e| panic!("{e}"));
+    let step = scene.solver.step.expect("a step");
+    let model = tensormass_runtime::model::build(&scene).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(model.mesh.len() as f64, number(&case("TORUS_2014")["expected"]["tets"]));
+    let mut bench = on_cpu::<f32>(&scene);
+    let (mut first, mut least, mut widest) = (None, (f64::INFINITY, 0), 0.0);
+    while (bench.state.step as f64) * step < 0.06 {
+        let [before, after] = bench.step();
+        if before != after && first.is_none() {
+            first = Some(bench.state.step);
+        }
+        let u = bench.system.backend.download(&bench.state.u);
+        let extent = |c: usize| {
+            let at = u.iter().zip(model.mesh.nodes()).map(|(u, x)| x[c] + u[c] * model.scale.length);
+            let (low, high) = at.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+            high - low
+        };
+        let height = extent(2);
+        if height < least.0 {
+            (least, widest) = ((height, bench.state.step), extent(0));
+        }
+    }
+    let [met, pressed] = [first.unwrap_or(0), least.1].map(|k| k as f64 * step);
+    let of = |key: &str| number(&wanted[key]);
+    eprintln!("met at {met} s, height {:e} m at {pressed} s, width {widest:e} m", least.0);
+    assert!((met - of("first_contact")).abs() <= 1.001 * step, "met at {met} s, {} s wanted", of("first_contact"));
+    let peak = of("t_max_compression");
+    assert!((pressed - peak).abs() <= 0.05 * peak, "pressed most at {pressed} s, {peak} s wanted");
+    let [height, width] = ["min_height", "max_width"].map(of);
+    assert!((least.0 - height).abs() <= 0.02 * height, "{:e} m high, {height:e} m wanted", least.0);
+    assert!((widest - width).abs() <= 0.02 * width, "{widest:e} m wide, {width:e} m wanted");
 }
 
 /// The largest total energy of a bouncing ball of 2 cm, beyond the initial one, as a part of what the fall brings; and its bounces.

@@ -53,8 +53,9 @@ fn attempt(text: &str, folder: &Path, out: &Path) -> Result<Outcome, String> {
     run(&scene, Some(out), &mut Silent).map_err(|e: RunError| e.to_string())
 }
 
-/// Refuses the scene with exactly this message (DIR stands for the scene's folder, LAWS for the build's laws), and leaves nothing behind.
-fn check(text: &str, out: &str, expected: &str) {
+/// Refuses the scene with exactly this message (DIR stands for the scene's folder, LAWS for the build's laws), and leaves nothing behind;
+/// the message is given back.
+fn check(text: &str, out: &str, expected: &str) -> String {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let at = folder.path();
     fs::write(at.join("inverted.msh"), INVERTED).expect("a mesh file");
@@ -67,29 +68,39 @@ fn check(text: &str, out: &str, expected: &str) {
         Ok(outcome) => format!("accepted: {:?}", outcome.ending),
         Err(message) => message.replace(&at.display().to_string(), "DIR").replace(&names, "LAWS"),
     };
-    assert!(message == expected, "\n--- expected\n{expected}\n--- found\n{message}\n--- for\n{text}");
+    let accepts = std::env::var_os("UPDATE_MESSAGES").is_some();
+    assert!(accepts || message == expected, "\n--- expected\n{expected}\n--- found\n{message}\n--- for\n{text}");
     assert_eq!(fs::read_dir(at).expect("a folder").count(), before, "something was written: {message}");
+    message
 }
 
+/// With UPDATE_MESSAGES set, the messages found replace those of the file, to be read before they are kept.
 #[test]
 fn each_has_its_message() {
     let right = tempfile::tempdir().expect("a temporary folder");
     let outcome = attempt(RIGHT, right.path(), &right.path().join("out")).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(outcome.ending, Ending::Done, "the scene to spoil must be right");
-    let cases: Vec<&str> = include_str!("failures.txt").split("\n## ").skip(1).collect();
-    assert!(cases.len() > 15, "failures.txt has {} cases", cases.len());
-    for case in cases {
+    let (head, cases) = include_str!("failures.txt").split_once("\n## ").expect("cases");
+    let (mut count, mut all) = (0, head.to_string());
+    for case in cases.split("\n## ") {
         let (header, expected) = case.split_once('\n').expect("a header and a message");
         let expected = expected.trim_end();
-        match (header.strip_prefix("out "), header.split_once(" => ")) {
+        let found = match (header.strip_prefix("out "), header.split_once(" => ")) {
             (Some(out), _) => check(RIGHT, out, expected),
             (None, Some((from, to))) => {
                 let [from, to] = [from, to].map(|part| part.replace("\\n", "\n"));
                 assert!(RIGHT.contains(&from), "the right scene has no {from:?}");
-                check(&RIGHT.replacen(&from, &to, 1), "out", expected);
+                check(&RIGHT.replacen(&from, &to, 1), "out", expected)
             }
             (None, None) => panic!("what is `{header}`?"),
-        }
+        };
+        all += &format!("\n## {header}\n{found}\n");
+        count += 1;
+    }
+    assert!(count > 15, "failures.txt has {count} cases");
+    if std::env::var_os("UPDATE_MESSAGES").is_some() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/failures.txt");
+        fs::write(path, all).expect("the file of cases can be written");
     }
 }
 

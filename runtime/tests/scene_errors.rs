@@ -39,35 +39,43 @@ component = "x"
 frames = 10
 "#;
 
-/// Refuses the scene with exactly this message.
-fn check(text: &str, overrides: &[&str], expected: &str) {
+/// Refuses the scene with exactly this message, which is given back.
+fn check(text: &str, overrides: &[&str], expected: &str) -> String {
     let overrides = overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>();
     let message = match overrides.and_then(|overrides| parse(text, "scene.toml", &overrides)) {
         Ok(_) => "accepted".to_owned(),
         Err(error) => error.to_string(),
     };
-    assert!(message == expected, "\n--- expected\n{expected}\n--- found\n{message}\n--- for\n{text}");
+    let accepts = std::env::var_os("UPDATE_MESSAGES").is_some();
+    assert!(accepts || message == expected, "\n--- expected\n{expected}\n--- found\n{message}\n--- for\n{text}");
+    message
 }
 
+/// With UPDATE_MESSAGES set, the messages found replace those of the file, to be read before they are kept.
 #[test]
 fn each_wrong_scene_has_its_message() {
     parse(RIGHT, "scene.toml", &[]).unwrap_or_else(|error| panic!("the scene to spoil must be right:\n{error}"));
-    let cases = include_str!("scene_errors.txt").split("\n## ").skip(1);
-    let mut count = 0;
-    for case in cases {
+    let (head, cases) = include_str!("scene_errors.txt").split_once("\n## ").expect("cases");
+    let (mut count, mut all) = (0, head.to_string());
+    for case in cases.split("\n## ") {
         let (header, expected) = case.split_once('\n').expect("a header and a message");
         let expected = expected.trim_end();
-        if let Some(argument) = header.strip_prefix("--set ") {
-            check(RIGHT, &[argument], expected);
+        let found = if let Some(argument) = header.strip_prefix("--set ") {
+            check(RIGHT, &[argument], expected)
         } else {
             let (from, to) = header.split_once(" =>").expect("TEXT => OTHER");
             let to = to.strip_prefix(' ').unwrap_or(to);
             let (from, to) = (from.replace("\\n", "\n"), to.replace("\\n", "\n"));
             let text = if from == "*" { to } else { RIGHT.replacen(&from, &to, 1) };
             assert_ne!(text, RIGHT, "the case changes nothing: {header}");
-            check(&text, &[], expected);
-        }
+            check(&text, &[], expected)
+        };
+        all += &format!("\n## {header}\n{found}\n");
         count += 1;
+    }
+    if std::env::var_os("UPDATE_MESSAGES").is_some() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scene_errors.txt");
+        std::fs::write(path, all).expect("the file of cases can be written");
     }
     assert!(count >= 40, "only {count} cases were read");
 }

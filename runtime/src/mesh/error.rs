@@ -214,6 +214,28 @@ pub enum MeshError {
         /// What was given.
         cells: usize,
     },
+    /// A torus without a hole, or of no size.
+    #[error(
+        "a torus of the radii {major} and {minor} m has no hole; give a minor radius above 0 and below the major one"
+    )]
+    TorusRadii {
+        /// The radius of the circle in the middle of its tube, m.
+        major: f64,
+        /// The radius of its tube, m.
+        minor: f64,
+    },
+    /// A torus of elements that make no cell.
+    #[error("a torus cannot be made of `{element}`; take a solid element")]
+    TorusElement {
+        /// The element.
+        element: &'static str,
+    },
+    /// Too few cells around a torus.
+    #[error("{around} cells do not go around a torus; give at least 3")]
+    TorusCells {
+        /// Cells around.
+        around: usize,
+    },
     /// A beam with no cells along an axis.
     #[error("the beam has no cells along {axis}; give at least 1")]
     BeamCells {
@@ -272,7 +294,10 @@ impl MeshError {
             | MeshError::BeamCells { .. }
             | MeshError::BeamSize { .. }
             | MeshError::BeamOrigin { .. }
-            | MeshError::BeamTooLarge { .. } => None,
+            | MeshError::BeamTooLarge { .. }
+            | MeshError::TorusRadii { .. }
+            | MeshError::TorusElement { .. }
+            | MeshError::TorusCells { .. } => None,
         }
     }
 
@@ -298,7 +323,10 @@ impl MeshError {
             | MeshError::BeamCells { .. }
             | MeshError::BeamSize { .. }
             | MeshError::BeamOrigin { .. }
-            | MeshError::BeamTooLarge { .. } => None,
+            | MeshError::BeamTooLarge { .. }
+            | MeshError::TorusRadii { .. }
+            | MeshError::TorusElement { .. }
+            | MeshError::TorusCells { .. } => None,
         }
     }
 }

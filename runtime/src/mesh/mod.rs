@@ -9,6 +9,7 @@ mod incidence;
 mod map;
 mod quality;
 mod topology;
+mod torus;
 mod validate;
 
 pub use beam::{beam, beam_of};
@@ -19,3 +20,4 @@ pub use map::integrals;
 pub(crate) use map::point_volumes;
 pub use quality::Quality;
 pub use topology::{Block, ElementId, FaceId, Groups, Mesh, NodeId, Orientation};
+pub use torus::{Ring, torus_of};

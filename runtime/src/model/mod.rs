@@ -17,7 +17,7 @@ use tensormass_kernels::{ElementEntry, RestPoint};
 use crate::body::{Body, Rows};
 use crate::mass::{self, MassMatrix};
 use crate::mesh::gmsh::{self, MeshFileError};
-use crate::mesh::{self, Mesh, Orientation, Quality};
+use crate::mesh::{self, Mesh, MeshError, Orientation, Quality, Ring};
 use crate::probe::Recorder;
 use crate::scale::Scale;
 use crate::scene::{self, Scene, SceneError};
@@ -157,12 +157,16 @@ fn load_mesh(scene: &Scene, warnings: &mut Vec<String>) -> Result<Mesh, BuildErr
     match &scene.mesh {
         scene::Mesh::Beam { beam } => {
             let cells = beam.cells.map(|c| c as usize);
-            let element = find_element(scene, &beam.element)?;
-            mesh::beam_of(element, beam.size, cells, beam.origin).map_err(|e| {
-                let text = e.to_string();
-                let (reason, remedy) = text.split_once("; ").unwrap_or((&text, "change the beam's size or cells"));
-                SceneError::at(scene.locate("mesh.beam"), reason, remedy).into()
-            })
+            let element = find_element(scene, "mesh.beam.element", &beam.element)?;
+            let made = mesh::beam_of(element, beam.size, cells, beam.origin);
+            made.map_err(|e| not_made(scene, "mesh.beam", &e).into())
+        }
+        scene::Mesh::Torus { torus } => {
+            let element = find_element(scene, "mesh.torus.element", &torus.element)?;
+            let scene::Torus { major_radius: major, minor_radius: minor, centre, axis, .. } = *torus;
+            let ring = Ring { major, minor, centre, axis: axis.index() };
+            let made = mesh::torus_of(element, ring, [torus.across, torus.around].map(|n| n as usize));
+            made.map_err(|e| not_made(scene, "mesh.torus", &e).into())
         }
         scene::Mesh::File { file, orient, scale } => {
             let orientation = if *orient { Orientation::Repair } else { Orientation::Refuse };
@@ -180,13 +184,20 @@ fn load_mesh(scene: &Scene, warnings: &mut Vec<String>) -> Result<Mesh, BuildErr
     }
 }
 
+/// Why a mesh cannot be made.
+fn not_made(scene: &Scene, path: &str, error: &MeshError) -> SceneError {
+    let text = error.to_string();
+    let (reason, remedy) = text.split_once("; ").unwrap_or((&text, "change its size or cells"));
+    SceneError::at(scene.locate(path), reason, remedy)
+}
+
 /// The element of a generated mesh.
-fn find_element(scene: &Scene, name: &str) -> Result<&'static ElementEntry, SceneError> {
+fn find_element(scene: &Scene, path: &str, name: &str) -> Result<&'static ElementEntry, SceneError> {
     tensormass_kernels::element(name).ok_or_else(|| {
         let bodies = tensormass_kernels::elements().iter().filter(|e| e.info.dimension > 1);
         let names: Vec<&str> = bodies.map(|e| e.info.name).collect();
         SceneError::at(
-            scene.locate("mesh.beam.element"),
+            scene.locate(path),
             format!("there is no element \"{name}\""),
             format!("elements of this build: {}", names.join(", ")),
         )

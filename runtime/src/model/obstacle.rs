@@ -157,6 +157,17 @@ fn starts_outside(
             -depth * place.scale.length
         ));
     }
+    for face in mesh.boundary() {
+        let corners = mesh.positions(&mesh.face_nodes(face));
+        let middle: [f64; 3] =
+            std::array::from_fn(|i| corners.iter().map(|x| x[i]).sum::<f64>() / corners.len() as f64);
+        if distance(&place.scaled(Point3::from(middle)).into()) < -ROUNDED * contact.size {
+            let [x, y, z] = middle;
+            return refused(format!(
+                "`obstacle.{i}` enters the body at the start, between its nodes: a face whose middle is at ({x}, {y}, {z})"
+            ));
+        }
+    }
     let origin = place.in_metres(pose.origin);
     if obstacle.shape != Shape::Plane && mesh.encloses(origin.into()) {
         let [x, y, z] = origin.coords.into();

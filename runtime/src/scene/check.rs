@@ -91,14 +91,18 @@ impl Context<'_> {
     }
 
     fn mesh(&self, mesh: &Mesh) -> Result<(), SceneError> {
-        let Mesh::Beam { beam } = mesh else { return Ok(()) };
         // Each is at most 10000, so the product fits.
-        let cells: u64 = beam.cells.iter().map(|&count| u64::from(count)).product();
+        let (path, counts) = match mesh {
+            Mesh::Beam { beam } => ("mesh.beam.cells", beam.cells),
+            Mesh::Torus { torus } => ("mesh.torus.around", [torus.across, torus.across, torus.around]),
+            Mesh::File { .. } => return Ok(()),
+        };
+        let cells: u64 = counts.iter().map(|&count| u64::from(count)).product();
         if cells <= MOST_CELLS {
             return Ok(());
         }
         let reason = format!("these are {cells} cells, more than {MOST_CELLS}");
-        Err(SceneError::at(self.place("mesh.beam.cells"), reason, "make the cells larger"))
+        Err(SceneError::at(self.place(path), reason, "make the cells larger"))
     }
 
     fn unique<'n>(&self, list: &str, names: impl Iterator<Item = Option<&'n str>>) -> Result<(), SceneError> {

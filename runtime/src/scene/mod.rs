@@ -27,6 +27,7 @@ pub use error::{Fault, Location, SceneError};
 pub use model::{
     About, Axis, Beam, Boundary, ConjugateGradient, History, Initial, Integrator, Load, Mass, Material, Mesh, Motion,
     Newton, Parameter, ParameterValue, PerElement, Precision, Preconditioner, Ramp, SceneData, Solver, TangentChoice,
+    Torus,
 };
 pub use obstacle::{Angle, Friction, Obstacle, Rod, Rotate, Shape};
 pub use output::{Component, EnergyPart, Field, Output, Probe, Statistic, StressComponent};

@@ -64,6 +64,11 @@ pub enum Mesh {
         /// The beam's size and division.
         beam: Beam,
     },
+    /// A torus made by the program.
+    Torus {
+        /// The torus's size and division.
+        torus: Torus,
+    },
     /// A mesh file.
     File {
         /// Path of the mesh file, relative to the scene file.
@@ -98,6 +103,40 @@ pub struct Beam {
     #[serde(default = "linear")]
     #[schemars(length(min = 1))]
     pub element: String,
+}
+
+/// A torus around an axis of coordinates, a bar of cells as those of a beam that is bent to a ring and rounded.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Torus {
+    /// The radius of the circle in the middle of its tube in m, from 1e-9 to 1e6.
+    #[schemars(range(min = 1e-9, max = 1e6))]
+    pub major_radius: f64,
+    /// The radius of its tube in m, from 1e-9 to 1e6, below the other.
+    #[schemars(range(min = 1e-9, max = 1e6))]
+    pub minor_radius: f64,
+    /// Number of cells across its tube, both ways, from 1 to 1000.
+    #[schemars(range(min = 1, max = 1000))]
+    pub across: u32,
+    /// Number of cells around, from 3 to 10000, 100000000 in all.
+    #[schemars(range(min = 3, max = 10_000))]
+    pub around: u32,
+    /// Its middle in m, each component within +-1e6.
+    #[serde(default)]
+    #[schemars(inner(range(min = -1e6, max = 1e6)))]
+    pub centre: [f64; 3],
+    /// The axis around which it runs.
+    #[serde(default = "upwards")]
+    pub axis: Axis,
+    /// What the cells are made of: `tetrahedron_p1`, or another solid element of the build.
+    #[serde(default = "linear")]
+    #[schemars(length(min = 1))]
+    pub element: String,
+}
+
+/// The axis of a torus that names none.
+fn upwards() -> Axis {
+    Axis::Z
 }
 
 /// The element of a beam that names none.
