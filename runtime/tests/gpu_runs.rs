@@ -53,11 +53,13 @@ fn scenes_of_the_repository() {
     let Some(gpu) = test_device().map(Arc::new) else { return };
     let coarse = "mesh.beam.cells=[10, 4, 4]";
     type Case<'a> = (&'a str, &'a [&'a str], &'a [(&'a str, f64)]);
-    let cases: [Case; 4] = [
+    let cases: [Case; 6] = [
         ("traction", &[coarse, "solver.duration=0.32"], &[("support", 1e6)]),
         ("traction", &[coarse, "solver.integrator=static", "solver.newton.max_iterations=5"], &[("support", 5e6)]),
         ("gravity-hooke", &[coarse, "solver.duration=1.0", "solver.precision=f32"], &[]),
         ("gravity-svk", &[coarse, "solver.duration=1.0", "solver.precision=f32"], &[]),
+        ("torsion", &[coarse, "solver.duration=0.4", "solver.precision=f32"], &[]),
+        ("bending", &[coarse, "solver.duration=0.4", "solver.precision=f32"], &[]),
     ];
     for (file, set, sizes) in cases {
         let text =

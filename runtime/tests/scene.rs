@@ -28,6 +28,14 @@ parameters.alpha = { per_element = "alpha.csv" }
 integrator = "static"
 "#;
 
+/// Where the moved end of the traction scene is along x at a time.
+fn pulled(scene: &Scene, time: f64) -> f64 {
+    match &scene.boundary[3] {
+        Boundary::Moved { motion, .. } => motion.x.as_ref().expect("moved along x").table().at(time),
+        other => panic!("{other:?}"),
+    }
+}
+
 #[test]
 fn shipped_scenes_say_what_the_paper_says() {
     let scene = shipped("traction.toml", &[]);
@@ -35,9 +43,7 @@ fn shipped_scenes_say_what_the_paper_says() {
     assert_eq!(scene.mesh, Mesh::Beam { beam });
     assert_eq!((scene.material[0].law.as_str(), scene.material[0].density), ("hooke", 1000.0));
     assert_eq!(scene.material[0].parameters["young"], Parameter::Constant(ParameterValue::Number(1e8)));
-    assert_eq!(scene.boundary[3].displacement(0.8), [Some(0.125), None, None]);
-    assert_eq!(scene.boundary[3].displacement(9.0), [Some(0.25), None, None]);
-    assert_eq!(scene.boundary[1].displacement(9.0), [None, Some(0.0), Some(0.0)]);
+    assert_eq!([0.8, 9.0].map(|t| pulled(&scene, t)), [0.125, 0.25]);
     assert_eq!(scene.solver.integrator, Integrator::ImplicitEuler);
     assert_eq!(scene.solver.precision, Precision::F32);
     // Every step of Table 2 divides the duration.
@@ -87,7 +93,7 @@ fn overrides_take_toml_values_and_words() {
     assert_eq!(scene.solver.integrator, Integrator::SemiImplicitEuler);
     assert_eq!((scene.solver.step, scene.solver.precision), (Some(2e-4), Precision::F64));
     assert_eq!(scene.material[0].density, 900.0);
-    assert_eq!(scene.boundary[3].displacement(9.0)[0], Some(0.5));
+    assert_eq!(pulled(&scene, 9.0), 0.5);
     assert!(matches!(scene.boundary[0].nodes().kind(), SelectionKind::Where(_)));
     assert_eq!((scene.output.every, scene.output.fields.as_slice()), (Some(5), [Field::J].as_slice()));
     assert_eq!(scene.initial.velocity, [1.0, 2.0, 3.0]);

@@ -1,13 +1,14 @@
 //! Supports and imposed motion: which components follow which history.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use super::place::Places;
 use crate::body::Constraint;
 use crate::history::History;
 use crate::mesh::Mesh;
 use crate::scale::Scale;
-use crate::scene::{Axis, Boundary, Scene, SceneError};
+use crate::scene::{Boundary, Scene, SceneError};
 
 /// The constrained components, ascending, and the histories that they follow; in scaled units.
 pub fn constraints(
@@ -22,10 +23,8 @@ pub fn constraints(
     for (i, boundary) in scene.boundary.iter().enumerate() {
         let path = format!("boundary.{i}.nodes");
         let nodes = places.nodes(scene, &path, boundary.nodes())?;
-        for (component, history) in histories(boundary) {
-            let history = history.scaled(1.0 / scale.time, 1.0 / scale.length);
-            let motion = number_of(history, &mut motions);
-            for &node in &nodes {
+        for (component, nodes, motion) in imposed(boundary, &nodes, mesh, scale, &mut motions) {
+            for node in nodes {
                 match found.insert((node, component), (motion, i)) {
                     Some((other, first)) if other != motion => {
                         let [x, y, z] = mesh.nodes()[node as usize];
@@ -64,13 +63,50 @@ fn number_of(history: History, motions: &mut Vec<History>) -> usize {
     })
 }
 
-fn histories(boundary: &Boundary) -> Vec<(u8, History)> {
-    let index = |axis: Axis| axis.index() as u8;
+/// Components of nodes, and the motion that they follow, which is added if need be.
+fn imposed(
+    boundary: &Boundary,
+    nodes: &[u32],
+    mesh: &Mesh,
+    scale: &Scale,
+    motions: &mut Vec<History>,
+) -> Vec<(u8, Vec<u32>, usize)> {
+    let scaled = |history: &History| history.scaled(1.0 / scale.time, 1.0 / scale.length);
+    let mut all =
+        |component: usize, history: &History| (component as u8, nodes.to_vec(), number_of(scaled(history), motions));
     match boundary {
-        Boundary::Fixed { fix, .. } => fix.iter().map(|&axis| (index(axis), History::constant(0.0))).collect(),
-        Boundary::Moved { motion, .. } => [(Axis::X, &motion.x), (Axis::Y, &motion.y), (Axis::Z, &motion.z)]
+        Boundary::Fixed { fix, .. } => fix.iter().map(|axis| all(axis.index(), &History::constant(0.0))).collect(),
+        Boundary::Moved { motion, .. } => [&motion.x, &motion.y, &motion.z]
             .into_iter()
-            .filter_map(|(axis, h)| h.as_ref().map(|h| (index(axis), h.table())))
+            .enumerate()
+            .filter_map(|(component, h)| h.as_ref().map(|h| all(component, &h.table())))
             .collect(),
+        Boundary::Turned { rotate, .. } => {
+            let length = rotate.axis.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let axis = rotate.axis.map(|x| x / length);
+            let angle = rotate.angle.table().scaled(1.0 / scale.time, 1.0);
+            let History::Table(angle) = angle else { unreachable!("angles are tables") };
+            let angle = Arc::new(angle);
+            let of_node = |node: &u32| {
+                let at = mesh.nodes()[*node as usize];
+                let arm = std::array::from_fn(|i| (at[i] - rotate.centre[i]) / scale.length);
+                (*node, History::turn(&angle, axis, arm))
+            };
+            let mut turned = vec![];
+            for (node, histories) in nodes.iter().map(of_node) {
+                for (component, history) in histories.into_iter().enumerate() {
+                    let motion = match history {
+                        // What turns differs from node to node: looking for an equal one would find none.
+                        History::Turn { .. } => {
+                            motions.push(history);
+                            motions.len() - 1
+                        }
+                        History::Table(_) => number_of(history, motions),
+                    };
+                    turned.push((component as u8, vec![node], motion));
+                }
+            }
+            turned
+        }
     }
 }

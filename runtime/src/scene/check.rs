@@ -151,6 +151,7 @@ impl Context<'_> {
         match boundary {
             Boundary::Fixed { fix, .. } => self.repeated(fix, &format!("{path}.fix")),
             Boundary::Moved { motion, .. } => self.motion(motion, &format!("{path}.move")),
+            Boundary::Turned { rotate, .. } => self.turn(rotate, &format!("{path}.rotate")),
         }
     }
 
@@ -182,9 +183,21 @@ impl Context<'_> {
         if let Some(motion) = &obstacle.translation {
             self.motion(motion, &format!("{path}.move"))?;
         }
-        match &obstacle.rotate {
-            Some(Rotate { angle: Angle::Ramp(ramp), .. }) => self.ramp(ramp, &format!("{path}.rotate.angle.ramp")),
-            Some(Rotate { angle: Angle::Velocity(_), .. }) | None => Ok(()),
+        obstacle.rotate.as_ref().map_or(Ok(()), |turn| self.turn(turn, &format!("{path}.rotate")))
+    }
+
+    fn turn(&self, turn: &Rotate, path: &str) -> Result<(), SceneError> {
+        if turn.axis == [0.0; 3] {
+            let reason = format!("`{path}.axis` has no direction");
+            return Err(SceneError::at(
+                self.place(&format!("{path}.axis")),
+                reason,
+                "give a vector whose length is not 0",
+            ));
+        }
+        match &turn.angle {
+            Angle::Ramp(ramp) => self.ramp(ramp, &format!("{path}.angle.ramp")),
+            Angle::Velocity(_) => Ok(()),
         }
     }
 
@@ -264,15 +277,22 @@ impl Context<'_> {
             return Ok(());
         }
         for (i, boundary) in data.boundary.iter().enumerate() {
-            let Boundary::Moved { motion, .. } = boundary else { continue };
-            for (axis, history) in [("x", &motion.x), ("y", &motion.y), ("z", &motion.z)] {
-                if matches!(history, Some(History::Velocity(_))) {
-                    return Err(SceneError::at(
-                        self.place(&format!("boundary.{i}.move.{axis}.velocity")),
-                        "a velocity leads nowhere without a duration",
-                        "give solver.duration, or a ramp",
-                    ));
+            let endless = match boundary {
+                Boundary::Moved { motion, .. } => [("x", &motion.x), ("y", &motion.y), ("z", &motion.z)]
+                    .into_iter()
+                    .find(|(_, history)| matches!(history, Some(History::Velocity(_))))
+                    .map(|(axis, _)| format!("move.{axis}.velocity")),
+                Boundary::Turned { rotate: Rotate { angle: Angle::Velocity(_), .. }, .. } => {
+                    Some("rotate.angle.velocity".to_owned())
                 }
+                Boundary::Turned { .. } | Boundary::Fixed { .. } => None,
+            };
+            if let Some(key) = endless {
+                return Err(SceneError::at(
+                    self.place(&format!("boundary.{i}.{key}")),
+                    "a velocity leads nowhere without a duration",
+                    "give solver.duration, or a ramp",
+                ));
             }
         }
         Ok(())

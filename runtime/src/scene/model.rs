@@ -3,7 +3,7 @@
 //! These types are read by serde, and the JSON schema that checks scene text is made from them; a range written here
 //! is therefore the range that is enforced and the range that is documented. All quantities are in SI units.
 
-use super::obstacle::Obstacle;
+use super::obstacle::{Obstacle, Rotate};
 use super::output::{Output, Probe};
 use super::selection::Selection;
 use crate::history::History as Table;
@@ -242,22 +242,20 @@ pub enum Boundary {
         #[serde(rename = "move")]
         motion: Motion,
     },
+    /// All components follow a turn about an axis.
+    Turned {
+        /// The nodes.
+        nodes: Selection,
+        /// The turn.
+        rotate: Rotate,
+    },
 }
 
 impl Boundary {
     /// The nodes that the condition holds for.
     pub fn nodes(&self) -> &Selection {
         match self {
-            Self::Fixed { nodes, .. } | Self::Moved { nodes, .. } => nodes,
-        }
-    }
-
-    /// Displacement in m of each component at a time in s; `None` where the component is free.
-    pub fn displacement(&self, time: f64) -> [Option<f64>; 3] {
-        match self {
-            Self::Fixed { fix, .. } => [Axis::X, Axis::Y, Axis::Z].map(|axis| fix.contains(&axis).then_some(0.0)),
-            Self::Moved { motion, .. } => [&motion.x, &motion.y, &motion.z]
-                .map(|history| history.as_ref().map(|history| history.table().at(time))),
+            Self::Fixed { nodes, .. } | Self::Moved { nodes, .. } | Self::Turned { nodes, .. } => nodes,
         }
     }
 }

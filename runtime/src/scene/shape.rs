@@ -205,7 +205,8 @@ impl<'s> Shape<'s> {
         let given: Vec<&(String, Node)> = entries.iter().filter(|(key, _)| own.contains(&key.as_str())).collect();
         match given.as_slice() {
             [] => {
-                let choice = own.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(" and ");
+                let choice: Vec<String> = own.iter().map(|key| format!("`{key}`")).collect();
+                let choice = enumeration(&choice, "and");
                 let own: Vec<String> = own
                     .iter()
                     .zip(leaves)
@@ -320,10 +321,16 @@ fn kind(leaf: &Value) -> &'static str {
 }
 
 fn alternatives(kinds: &[&str]) -> String {
-    match kinds {
+    enumeration(kinds, "or")
+}
+
+/// "a, b and c".
+fn enumeration(all: &[impl AsRef<str>], last_by: &str) -> String {
+    let all: Vec<&str> = all.iter().map(AsRef::as_ref).collect();
+    match all.as_slice() {
         [] => String::new(),
         [only] => (*only).to_owned(),
-        [most @ .., last] => format!("{} or {last}", most.join(", ")),
+        [most @ .., last] => format!("{} {last_by} {last}", most.join(", ")),
     }
 }
 

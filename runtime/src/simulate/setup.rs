@@ -32,6 +32,10 @@ fn ramps_end(scene: &Scene) -> f64 {
     });
     let motions = scene.boundary.iter().flat_map(|b| match b {
         scene::Boundary::Fixed { .. } => vec![],
+        scene::Boundary::Turned { rotate, .. } => match &rotate.angle {
+            scene::Angle::Ramp(ramp) => vec![ramp.end()],
+            scene::Angle::Velocity(_) => vec![],
+        },
         scene::Boundary::Moved { motion, .. } => [&motion.x, &motion.y, &motion.z]
             .into_iter()
             .filter_map(|h| match h {
