@@ -10,7 +10,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use tensormass_runtime::device::{DeviceChoice, DeviceError};
 use tensormass_runtime::scene::{Override, Scene, load};
-use tensormass_runtime::simulate::{Ending, Observer, Outcome, RunError, run_on};
+use tensormass_runtime::simulate::{Checkpoint, Ending, Observer, Outcome, RunError, run_from};
 use tensormass_runtime::step_limit::StepLimits;
 use tensormass_runtime::system::SolveError;
 use tensormass_runtime::target::Target;
@@ -30,6 +30,10 @@ pub struct Arguments {
     /// any GPU; `tensormass devices` lists their names.
     #[arg(long, value_name = "auto|cpu|gpu|gpu:NAME", default_value_t = DeviceChoice::Auto)]
     device: DeviceChoice,
+    /// A checkpoint of the same scene from which to go on, checkpoint.tmc in the folder of the results of the run that wrote it.
+    /// Results in --out until then are kept.
+    #[arg(long, value_name = "FILE")]
+    resume: Option<PathBuf>,
     /// Measure before the first step how products with the tangent are faster on this CPU; as --set
     /// solver.cg.tangent=measured. Results depend on it in their last digits only.
     #[arg(long)]
@@ -82,8 +86,11 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
     let flag = Arc::clone(&interrupted);
     // Without a handler an interruption ends the process as it always did: nothing else depends on it.
     let _ = ctrlc::set_handler(move || flag.store(true, Ordering::SeqCst));
+    let from = arguments.resume.as_deref().map(Checkpoint::read).transpose();
+    let from = from.map_err(|e| Failure::bad_input(format!("--resume {e}")))?;
     let mut display = Display::new(interrupted, arguments.quiet || arguments.json, arguments.quiet);
-    let outcome = run_on(&target, &scene, Some(&out), &mut display).map_err(|e| match e {
+    let outcome = run_from(&target, &scene, Some(&out), from.as_ref(), &mut display).map_err(|e| match e {
+        RunError::Checkpoint(e) => Failure::bad_input(format!("--resume {e}")),
         RunError::Build(e) => Failure::bad_input(e.to_string()),
         RunError::Output(e) => Failure::bad_input(e.to_string()),
         RunError::Threads { .. } => Failure::bad_input(e.to_string()),
@@ -106,7 +113,10 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
             let device = matches!(e, SolveError::Device(_));
             Err(if device { Failure::Other(text) } else { Failure::Simulation(text) })
         }
-        Ending::Interrupted => Err(Failure::Interrupted(format!("interrupted; the results are in {}", out.display()))),
+        Ending::Interrupted => Err(Failure::Interrupted(format!(
+            "interrupted; the results are in {out}; go on with --resume {out}/checkpoint.tmc",
+            out = out.display()
+        ))),
     }
 }
 

@@ -39,19 +39,31 @@ impl Frames {
     /// # Errors
     /// The folder cannot be written.
     pub fn create(out: &Path, mesh: &Mesh, fields: &[Field]) -> Result<Self, OutputError> {
+        let index = PvdWriter::create(&out.join("frames.pvd"))?;
+        Self::with(out, mesh, fields, index, 0)
+    }
+
+    /// As [`Frames::create`], after the frames that are there until a time.
+    ///
+    /// # Errors
+    /// The folder cannot be read or written.
+    pub fn resume(out: &Path, mesh: &Mesh, fields: &[Field], until: f64) -> Result<Self, OutputError> {
+        let (index, count) = PvdWriter::resume(&out.join("frames.pvd"), until)?;
+        Self::with(out, mesh, fields, index, count)
+    }
+
+    fn with(out: &Path, mesh: &Mesh, fields: &[Field], index: PvdWriter, count: u32) -> Result<Self, OutputError> {
         let folder = out.join("frames");
         create_folder(&folder)?;
         // A longer earlier run would leave its last frames beside the new ones.
-        for k in 0.. {
+        for k in count.. {
             let stale = folder.join(frame_name(k));
             if !stale.exists() {
                 break;
             }
             remove_file(&stale)?;
         }
-        let index = PvdWriter::create(&out.join("frames.pvd"))?;
-        let cells = cells_of(mesh);
-        Ok(Self { folder: out.to_path_buf(), index, fields: fields.to_vec(), cells, count: 0 })
+        Ok(Self { folder: out.to_path_buf(), index, fields: fields.to_vec(), cells: cells_of(mesh), count })
     }
 
     /// What the fields read of a state.

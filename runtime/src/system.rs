@@ -1,5 +1,7 @@
 //! A body on a backend: state, masses, loads and imposed motion over time, shared by all integrators.
 
+use serde_json::Value;
+
 use crate::backend::{Backend, ForceField, LeftDomain, Meeting};
 use crate::body::Body;
 use crate::device::DeviceError;
@@ -222,6 +224,12 @@ pub trait Integrator<B: Backend, F: ForceField<B>> {
     /// # Errors
     /// The step failed; the state is then that before the step.
     fn step(&mut self, system: &mut System<B, F>, state: &mut State<B>, h: f64) -> Result<StepReport, SolveError>;
+    /// What it remembers from step to step besides the state.
+    fn memory(&self) -> Value {
+        Value::Null
+    }
+    /// Goes on with what another run's remembered; nothing, where that is none of its own.
+    fn recall(&mut self, _memory: &Value) {}
 }
 
 /// What a step cost.

@@ -7,7 +7,7 @@
 //! knows that a turned body has no forces. Where stiffnesses differ by a factor of a thousand that loses two digits or
 //! three, of a million four: the rule takes a matrix in f64 and of bodies of one material alone.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::body::{Body, LawBatch};
 use crate::mesh::Incidence;
@@ -15,7 +15,7 @@ use crate::plan::{point_operations, tangent_operations};
 use crate::scene::{Scene, TangentChoice};
 
 /// How products with a law's tangent are computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Tangent {
     /// What does not depend on the increment is stored once a linearisation.
@@ -110,6 +110,8 @@ pub enum ChosenBy {
     Scene,
     /// What was measured before the first step.
     Measurement,
+    /// The run that is resumed.
+    Checkpoint,
 }
 
 /// What a scene asks for, for each law of its body; the rule's choice where it asks for a measurement.

@@ -13,7 +13,7 @@ pub const ATTEMPTS: usize = 30;
 /// How often a node may change its mind in a step before it stays as it is.
 const CHANGES: u32 = 4;
 /// Friction that changes by less than this part of its limit has settled.
-const SETTLED: f64 = 1e-4;
+const SETTLED: f64 = 1e-3;
 
 /// A node that an obstacle holds.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,18 +59,44 @@ impl Holding {
         &self.held
     }
 
+    /// What the next step begins with: the number and the obstacle of each node, whether it sticks, and its friction.
+    pub fn memory(&self) -> Vec<(usize, usize, bool, [f64; 3])> {
+        self.held.iter().map(|held| (held.index, held.obstacle, held.sticks, held.friction)).collect()
+    }
+
+    /// Goes on with a memory of the same contact.
+    pub fn recall(&mut self, memory: &serde_json::Value) {
+        let known: Vec<(usize, usize, bool, [f64; 3])> = serde_json::from_value(memory.clone()).unwrap_or_default();
+        let held = |(index, obstacle, sticks, friction)| Held {
+            index,
+            node: 0,
+            obstacle,
+            normal: [0.0; 3],
+            target: [0.0; 3],
+            sticks,
+            friction,
+            changes: 0,
+        };
+        self.held = known.into_iter().map(held).collect();
+    }
+
     /// Begins a step: of the nodes held before, those still on an obstacle.
     pub fn begin(&mut self, contact: &Contact, passages: &[Passage<f64>], u: &[[f64; 3]], tolerance: f64) {
         self.let_go.clear();
         let before = std::mem::take(&mut self.held);
-        for old in before {
+        for old in before.into_iter().filter(|h| h.index < contact.nodes.len() && h.obstacle < passages.len()) {
             let from = contact.place(old.index, u);
             let seen = contact.obstacles[old.obstacle].shape.nearest::<f64>(passages[old.obstacle].local(from));
             // Nodes that slide on a curved surface leave it by a part of their way.
             if seen.distance <= 16.0 * tolerance {
                 let still = Move { from, by: [0.0; 3] };
                 let held = hold(contact, passages, (old.index, old.obstacle), still, tolerance);
-                self.held.extend(held.map(|held| Held { sticks: old.sticks && held.sticks, ..held }));
+                // Friction goes on with what it was.
+                self.held.extend(held.map(|held| Held {
+                    sticks: old.sticks && held.sticks,
+                    friction: tangential(old.friction, held.normal),
+                    ..held
+                }));
             }
         }
     }

@@ -4,6 +4,8 @@
 //! schemes stay explicit, and are of first order in these forces. Contact is the last thing in a step (Li et al. 2014,
 //! Algorithm 1).
 
+use serde_json::{Value, json};
+
 use crate::backend::{Advance, Backend, ForceField};
 use crate::system::{Integrator, SolveError, State, StepReport, System};
 
@@ -101,5 +103,13 @@ impl<B: Backend, F: ForceField<B>> Integrator<B, F> for CentralDifference<B> {
         impose(system, state, state.time + h, h);
         system.meet_obstacles(state, h);
         Ok(StepReport { forces: 1, ..StepReport::default() })
+    }
+
+    fn memory(&self) -> Value {
+        json!({ "started": self.started })
+    }
+
+    fn recall(&mut self, memory: &Value) {
+        self.started = memory["started"] == true;
     }
 }

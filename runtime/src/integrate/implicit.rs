@@ -9,6 +9,8 @@
 
 use std::sync::Arc;
 
+use serde_json::{Value, json};
+
 use crate::backend::{Backend, ForceField};
 use crate::contact::{ATTEMPTS, Attempt, Contact, Held, Holding};
 use crate::system::{Integrator, SolveError, State, StepReport, System};
@@ -154,5 +156,13 @@ impl<B: Backend, F: ForceField<B>> Integrator<B, F> for ImplicitEuler<B> {
         // What rounding left, and what did not settle.
         system.meet_obstacles(state, h);
         Ok(report)
+    }
+
+    fn memory(&self) -> Value {
+        json!({ "held": self.holding.memory() })
+    }
+
+    fn recall(&mut self, memory: &Value) {
+        self.holding.recall(&memory["held"]);
     }
 }

@@ -30,6 +30,33 @@ impl ProbeTable {
         Ok(ProbeTable { path: path.to_owned(), file, columns: columns.len(), line: String::new() })
     }
 
+    /// Goes on with a file of the same columns, of which rows after a time, the first column, are dropped; creates it where
+    /// there is none.
+    ///
+    /// # Errors
+    /// As [`ProbeTable::create`]; or the file cannot be read.
+    pub fn resume<S: AsRef<str>>(path: &Path, columns: &[S], until: f64) -> Result<ProbeTable, OutputError> {
+        let before = match std::fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => String::new(),
+            Err(e) => return Err(OutputError::io(path)(e)),
+        };
+        let names: Vec<String> = columns.iter().map(|name| quoted(name.as_ref())).collect();
+        let header = names.join(",");
+        // A row that a killed run has not finished has no end of line.
+        let whole = before.rfind('\n').map_or("", |end| &before[..end]);
+        let is_before =
+            |line: &&str| line.split(',').next().and_then(|t| t.parse().ok()).is_some_and(|t: f64| t <= until);
+        let rows: Vec<&str> = match whole.lines().next() {
+            Some(first) if first == header => whole.lines().skip(1).filter(is_before).collect(),
+            _ => vec![],
+        };
+        let kept: String = std::iter::once(header.as_str()).chain(rows).map(|line| format!("{line}\n")).collect();
+        super::atomic::write_text(path, &kept)?;
+        let file = File::options().append(true).open(path).map_err(OutputError::io(path))?;
+        Ok(ProbeTable { path: path.to_owned(), file, columns: columns.len(), line: String::new() })
+    }
+
     /// Appends a row, one value a column.
     ///
     /// # Errors

@@ -24,6 +24,24 @@ impl PvdWriter {
         Ok(writer)
     }
 
+    /// Goes on with an index, of which frames after a time are dropped; how many are left.
+    ///
+    /// # Errors
+    /// [`OutputError::Io`] if it cannot be read or written.
+    pub fn resume(path: &Path, until: f64) -> Result<(PvdWriter, u32), OutputError> {
+        let before = match std::fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => String::new(),
+            Err(e) => return Err(OutputError::io(path)(e)),
+        };
+        let time = |line: &str| line.split("timestep=\"").nth(1)?.split('"').next()?.parse::<f64>().ok();
+        let kept: Vec<&str> = before.lines().filter(|line| time(line).is_some_and(|t| t <= until)).collect();
+        let frames = kept.iter().map(|line| format!("{line}\n")).collect();
+        let writer = PvdWriter { path: path.to_owned(), frames };
+        writer.write()?;
+        Ok((writer, kept.len() as u32))
+    }
+
     /// Adds a frame: its time (s) and its file, relative to the index's folder. Call it once that file is complete.
     ///
     /// # Errors

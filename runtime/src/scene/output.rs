@@ -218,11 +218,15 @@ pub struct Output {
     /// Probes are recorded every so many steps, and at the first and the last; from 1 to 1000000000.
     #[schemars(range(min = 1, max = 1_000_000_000))]
     pub probe_every: u32,
+    /// A checkpoint every so many steps, and after the last; from 1 to 1000000000. Without it there is one only where a run is
+    /// interrupted.
+    #[schemars(range(min = 1, max = 1_000_000_000))]
+    pub checkpoint_every: Option<u32>,
 }
 
 impl Default for Output {
     fn default() -> Self {
-        Self { frames: None, every: None, fields: vec![Field::Displacement], probe_every: 1 }
+        Self { frames: None, every: None, fields: vec![Field::Displacement], probe_every: 1, checkpoint_every: None }
     }
 }
 
@@ -230,6 +234,11 @@ impl Output {
     /// Whether probes are recorded after `step` of `steps` steps.
     pub fn wants_probes(&self, step: u64, steps: u64) -> bool {
         step == 0 || step == steps || step.is_multiple_of(u64::from(self.probe_every))
+    }
+
+    /// Whether there is a checkpoint after `step` of `steps` steps.
+    pub fn wants_checkpoint(&self, step: u64, steps: u64) -> bool {
+        self.checkpoint_every.is_some_and(|every| step == steps || step.is_multiple_of(u64::from(every)))
     }
 
     /// Whether the state after `step` of `steps` steps is written (step 0 is the initial state).

@@ -25,6 +25,37 @@ pub(super) enum Record {
 pub(super) struct Impulses([Pending; 2]);
 
 impl Impulses {
+    /// What a checkpoint keeps: the impulses on the device, those pending for each kind, and when each was last recorded.
+    pub(super) fn kept<B: Backend, F: ForceField<B>>(
+        &self,
+        system: &System<B, F>,
+    ) -> Option<([Vec<[f64; 3]>; 3], [f64; 2])> {
+        let impulse = system.touch.as_ref()?.impulse.as_ref()?;
+        let pending = |k: usize| {
+            let mut impulses = self.0[k].impulses.clone();
+            impulses.resize(system.body.masses.len(), [0.0; 3]);
+            impulses
+        };
+        Some(([system.backend.download(impulse), pending(0), pending(1)], [self.0[0].since, self.0[1].since]))
+    }
+
+    /// Goes on with what a checkpoint kept, or from a time on where it kept nothing.
+    pub(super) fn resume<B: Backend, F: ForceField<B>>(
+        &mut self,
+        system: &mut System<B, F>,
+        kept: Option<([&[[f64; 3]]; 3], [f64; 2])>,
+        time: f64,
+    ) {
+        let Some(([device, probes, frames], since)) = kept else {
+            self.0.iter_mut().for_each(|pending| pending.since = time);
+            return;
+        };
+        for (pending, (impulses, since)) in self.0.iter_mut().zip([(probes, since[0]), (frames, since[1])]) {
+            *pending = Pending { impulses: impulses.to_vec(), since };
+        }
+        system.add_impulses(device);
+    }
+
     /// The mean contact force on each node since the last record of a kind, in scaled units; 0 at the beginning.
     pub(super) fn forces<B: Backend, F: ForceField<B>>(
         &mut self,

@@ -1,5 +1,6 @@
 //! Runs a scene: steps a model through time and writes probes, frames and the summary.
 
+mod checkpoint;
 mod impulses;
 mod run;
 mod setup;
@@ -21,10 +22,12 @@ use crate::plan::Layout;
 use crate::scene::{self, Scene};
 use crate::step_limit::StepLimits;
 use crate::system::SolveError;
-use crate::tangent::Tangent;
+use crate::tangent::{ChosenBy, Tangent};
 use crate::target::Target;
 
 use run::Run;
+
+pub use checkpoint::{Checkpoint, CheckpointError};
 
 /// Why a run could not be carried out at all.
 #[derive(Debug, thiserror::Error)]
@@ -38,6 +41,9 @@ pub enum RunError {
     /// The device cannot compute the scene.
     #[error(transparent)]
     Device(#[from] DeviceError),
+    /// The checkpoint is of another run.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
     /// Threads cannot be started.
     #[error("cannot start {threads} threads: {reason}; set solver.threads to fewer")]
     Threads {
@@ -117,6 +123,21 @@ pub fn run_on(
     out: Option<&Path>,
     observer: &mut (dyn Observer + Send),
 ) -> Result<Outcome, RunError> {
+    run_from(target, scene, out, None, observer)
+}
+
+/// As [`run_on`], from a checkpoint of the same scene on, if one is given: as if the run had never stopped, bit for bit on the
+/// same device. Results that the folder has until then are kept, later ones are replaced.
+///
+/// # Errors
+/// See [`RunError`].
+pub fn run_from(
+    target: &Target,
+    scene: &Scene,
+    out: Option<&Path>,
+    from: Option<&Checkpoint>,
+    observer: &mut (dyn Observer + Send),
+) -> Result<Outcome, RunError> {
     let model = build(scene)?;
     let threads = scene.solver.threads;
     let pool = rayon::ThreadPoolBuilder::new()
@@ -124,8 +145,8 @@ pub fn run_on(
         .build()
         .map_err(|e| RunError::Threads { threads, reason: e.to_string() })?;
     pool.install(|| match (target, scene.solver.precision) {
-        (Target::Cpu, scene::Precision::F32) => on_cpu::<f32>(scene, model, out, observer),
-        (Target::Cpu, scene::Precision::F64) => on_cpu::<f64>(scene, model, out, observer),
+        (Target::Cpu, scene::Precision::F32) => on_cpu::<f32>(scene, model, out, from, observer),
+        (Target::Cpu, scene::Precision::F64) => on_cpu::<f64>(scene, model, out, from, observer),
         #[cfg(feature = "gpu")]
         (Target::Gpu(gpu, options), scene::Precision::F32) => {
             let backend = GpuBackend::new(Arc::clone(gpu), &model.body, *options)?;
@@ -135,7 +156,7 @@ pub fn run_on(
             if scene.solver.cg.tangent != scene::TangentChoice::Auto {
                 run.warnings.push("solver.cg.tangent has no effect on a GPU: there products store nothing".to_owned());
             }
-            run.all(out, observer)
+            run.all(out, from, observer)
         }
         #[cfg(feature = "gpu")]
         (Target::Gpu(..), scene::Precision::F64) => Err(DeviceError::Precision.into()),
@@ -147,12 +168,18 @@ fn on_cpu<R: Precision>(
     scene: &Scene,
     model: Model,
     out: Option<&Path>,
+    from: Option<&Checkpoint>,
     observer: &mut (dyn Observer + Send),
 ) -> Result<Outcome, RunError> {
     let body = &model.body;
     let backend = CpuBackend::<R>::new(body);
     let field = CpuField::<R>::new(&backend, body);
-    let (field, tangents, by) = setup::with_tangents(scene, body, &backend, field);
+    let (field, tangents, by) = match from.map(Checkpoint::tangents) {
+        Some(known) if known.len() == body.batches.len() => {
+            (field.with_tangents(known), known.to_vec(), ChosenBy::Checkpoint)
+        }
+        _ => setup::with_tangents(scene, body, &backend, field),
+    };
     let mut run = Run::new(scene, model, backend, field, Layout::Cpu);
     if scene.solver.precision == scene::Precision::F32
         && tangents.contains(&Tangent::Assembled)
@@ -165,5 +192,5 @@ fn on_cpu<R: Precision>(
         );
     }
     run.tangents = Some((tangents, by));
-    run.all(out, observer)
+    run.all(out, from, observer)
 }

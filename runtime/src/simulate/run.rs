@@ -1,6 +1,6 @@
 //! One run on one backend: steps, records, and what is written of them.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde_json::{Value, json};
@@ -16,10 +16,14 @@ use crate::step_limit::{StepLimits, element_limit, power_limit};
 use crate::system::{SolveError, State, StepReport, System};
 use crate::tangent::{ChosenBy, Tangent};
 
+use super::checkpoint::{Checkpoint, header};
 use super::impulses::{Impulses, Record};
 use super::setup::{Stepper, integrator, stepping};
 use super::watch::Watch;
 use super::{Ending, Observer, Outcome, RunError};
+
+/// The name of the file of the newest checkpoint.
+const CHECKPOINT: &str = "checkpoint.tmc";
 
 /// A run of a scene on a backend.
 pub(super) struct Run<'a, B: Backend, F: ForceField<B>> {
@@ -69,9 +73,25 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
     }
 
     /// Takes all steps and writes the results.
-    pub(super) fn all(mut self, out: Option<&Path>, observer: &mut (dyn Observer + Send)) -> Result<Outcome, RunError> {
+    pub(super) fn all(
+        mut self,
+        out: Option<&Path>,
+        from: Option<&Checkpoint>,
+        observer: &mut (dyn Observer + Send),
+    ) -> Result<Outcome, RunError> {
         let started = Instant::now();
-        let mut results = Results::create(self.scene, &self.model, out)?;
+        if let Some(from) = from {
+            from.check(self.scene, &self.model, self.step * self.model.scale.time, self.steps)?;
+            let device = self.system.backend.name();
+            if from.device() != device {
+                self.warnings.push(format!(
+                    "the run goes on on {device}, and began on {}: results agree to rounding only",
+                    from.device()
+                ));
+            }
+        }
+        let until = from.map(|from| self.step * from.step() as f64 * self.model.scale.time);
+        let mut results = Results::create(self.scene, &self.model, out, until)?;
         let of_frames = results.frames.as_ref().is_some_and(|frames| frames.needs().contact);
         if let Some(touch) = &mut self.system.touch
             && (of_frames || self.model.recorder.needs().contact)
@@ -82,10 +102,23 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         for warning in &self.warnings {
             observer.warning(warning);
         }
-        let ending = match self.record(&mut results)? {
+        let begun = match from {
+            // The state of a checkpoint was recorded before, if it was to be.
+            Some(from) => {
+                self.go_on(from);
+                Ok(())
+            }
+            None => self.record(&mut results)?,
+        };
+        let ending = match begun {
             Err(e) => Ending::Failed(e),
             Ok(()) => self.step_through(&mut results, observer)?,
         };
+        if ending == Ending::Interrupted
+            && let Some(out) = out
+        {
+            self.checkpoint().write(&out.join(CHECKPOINT))?;
+        }
         if ending != Ending::Done
             && let Some(frames) = &mut results.frames
         {
@@ -115,7 +148,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         observer: &mut (dyn Observer + Send),
     ) -> Result<Ending, RunError> {
         // The step up to which every state is looked at: the first one, then those of a stretch that went wrong.
-        let mut careful = 1;
+        let mut careful = self.state.step + 1;
         while self.state.step < self.steps {
             let before = self.state.step;
             let ahead = if before < careful { 1 } else { self.stretch() };
@@ -136,6 +169,11 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
             {
                 return Ok(Ending::Failed(e));
             }
+            if let Some(out) = &results.folder
+                && self.scene.output.wants_checkpoint(self.state.step, self.steps)
+            {
+                self.checkpoint().write(&out.join(CHECKPOINT))?;
+            }
             observer.progress(self.state.step, self.steps);
             if self.state.step < self.steps && observer.interrupted() {
                 return Ok(Ending::Interrupted);
@@ -148,7 +186,9 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
     fn is_recorded(&self, step: u64) -> bool {
         let output = &self.scene.output;
         let probes = !self.model.recorder.names().is_empty() || step == self.steps;
-        (probes && output.wants_probes(step, self.steps)) || output.wants_frame(step, self.steps)
+        (probes && output.wants_probes(step, self.steps))
+            || output.wants_frame(step, self.steps)
+            || output.wants_checkpoint(step, self.steps)
     }
 
     /// Steps that may be taken before anything is recorded, as many as the backend likes to take without being looked at.
@@ -216,6 +256,32 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
             self.at(before);
         }
         good
+    }
+
+    /// All that it takes to go on from here.
+    fn checkpoint(&self) -> Checkpoint {
+        let (scale, nodes) = (self.model.scale, self.model.mesh.nodes().len() as u64);
+        let device = self.system.backend.name();
+        let mut header = header(self.scene, &self.model, device, [self.state.step, nodes], self.step * scale.time);
+        header.integrator = self.integrator.memory();
+        header.tangents = self.tangents.as_ref().map(|(tangents, _)| tangents.clone()).unwrap_or_default();
+        let mut vectors = vec![&self.state.u, &self.state.v];
+        let mut vectors: Vec<_> = vectors.drain(..).map(|x| self.system.backend.download(x)).collect();
+        if let Some((impulses, recorded)) = self.impulses.kept(&self.system) {
+            header.recorded = Some(recorded);
+            vectors.extend(impulses);
+        }
+        Checkpoint::new(header, vectors)
+    }
+
+    /// Takes the state of a checkpoint, which was checked.
+    fn go_on(&mut self, from: &Checkpoint) {
+        self.state.u = self.system.backend.upload(&from.vectors[0]);
+        self.state.v = self.system.backend.upload(&from.vectors[1]);
+        self.at(from.step());
+        self.integrator.recall(&from.header.integrator);
+        let kept = from.header.recorded.map(|recorded| ([2, 3, 4].map(|k| from.vectors[k].as_slice()), recorded));
+        self.impulses.resume(&mut self.system, kept, self.state.time);
     }
 
     /// Displacement and velocity, to come back to.
@@ -462,14 +528,16 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
 
 /// The files of a run.
 struct Results {
+    folder: Option<PathBuf>,
     probes: Option<ProbeTable>,
     frames: Option<Frames>,
     last: Vec<f64>,
 }
 
 impl Results {
-    fn create(scene: &Scene, model: &Model, out: Option<&Path>) -> Result<Self, OutputError> {
-        let Some(out) = out else { return Ok(Self { probes: None, frames: None, last: vec![] }) };
+    /// Files in a folder; those of a run until a time are kept, if it goes on from there.
+    fn create(scene: &Scene, model: &Model, out: Option<&Path>, until: Option<f64>) -> Result<Self, OutputError> {
+        let Some(out) = out else { return Ok(Self { folder: None, probes: None, frames: None, last: vec![] }) };
         create_folder(out)?;
         // What an earlier run left under the names that this one may not write.
         for stale in ["summary.json", "failure.json"] {
@@ -477,11 +545,16 @@ impl Results {
         }
         let mut columns = vec!["time_s".to_string()];
         columns.extend(model.recorder.names().iter().map(|(name, unit)| format!("{name} [{unit}]")));
-        let probes = ProbeTable::create(&out.join("probes.csv"), &columns)?;
-        let frames = match scene.output.frames {
-            Some(0) => None,
-            _ => Some(Frames::create(out, &model.mesh, &scene.output.fields)?),
+        let (table, fields) = (out.join("probes.csv"), &scene.output.fields);
+        let probes = match until {
+            Some(until) => ProbeTable::resume(&table, &columns, until)?,
+            None => ProbeTable::create(&table, &columns)?,
         };
-        Ok(Self { probes: Some(probes), frames, last: vec![] })
+        let frames = match (scene.output.frames, until) {
+            (Some(0), _) => None,
+            (_, Some(until)) => Some(Frames::resume(out, &model.mesh, fields, until)?),
+            (_, None) => Some(Frames::create(out, &model.mesh, fields)?),
+        };
+        Ok(Self { folder: Some(out.to_owned()), probes: Some(probes), frames, last: vec![] })
     }
 }
