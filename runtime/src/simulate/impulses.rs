@@ -11,6 +11,10 @@ struct Pending {
     since: f64,
 }
 
+/// What a checkpoint keeps of impulses: those on the device, those pending for probes and for frames; and when each of these
+/// was last recorded.
+pub(super) type Kept<T> = ([T; 3], [f64; 2]);
+
 /// A kind of record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Record {
@@ -25,11 +29,8 @@ pub(super) enum Record {
 pub(super) struct Impulses([Pending; 2]);
 
 impl Impulses {
-    /// What a checkpoint keeps: the impulses on the device, those pending for each kind, and when each was last recorded.
-    pub(super) fn kept<B: Backend, F: ForceField<B>>(
-        &self,
-        system: &System<B, F>,
-    ) -> Option<([Vec<[f64; 3]>; 3], [f64; 2])> {
+    /// What a checkpoint keeps.
+    pub(super) fn kept<B: Backend, F: ForceField<B>>(&self, system: &System<B, F>) -> Option<Kept<Vec<[f64; 3]>>> {
         let impulse = system.touch.as_ref()?.impulse.as_ref()?;
         let pending = |k: usize| {
             let mut impulses = self.0[k].impulses.clone();
@@ -43,7 +44,7 @@ impl Impulses {
     pub(super) fn resume<B: Backend, F: ForceField<B>>(
         &mut self,
         system: &mut System<B, F>,
-        kept: Option<([&[[f64; 3]]; 3], [f64; 2])>,
+        kept: Option<Kept<&[[f64; 3]]>>,
         time: f64,
     ) {
         let Some(([device, probes, frames], since)) = kept else {
