@@ -177,6 +177,7 @@ mod gpu {
             constraints: vec![],
             motions: vec![],
             loads: vec![],
+            pressures: vec![],
             contact: None,
             mass_damping: 0.0,
             stiffness_damping: 0.0,

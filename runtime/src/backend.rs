@@ -5,6 +5,7 @@
 //! order. To return one, a device has to be waited for; a solver that needs scalars in every iteration keeps them in
 //! [`Backend::Registers`], where the vectors live, and gives its recurrences as [`Update`]s.
 
+use crate::body::PressedFace;
 use crate::contact::{Contact, Held, Passage};
 use crate::device::DeviceError;
 use crate::mass::{MassMatrix, Masses};
@@ -101,6 +102,8 @@ pub trait Backend {
     type Matrix;
     /// What may touch what.
     type Contact;
+    /// Faces under a pressure.
+    type Pressure;
 
     /// A vector of zeros.
     fn zeros(&self) -> Self::Vector;
@@ -176,6 +179,10 @@ pub trait Backend {
         self.axpy(kick, acceleration, v);
         self.axpy(drift, v, u);
     }
+    /// Some faces of the body for which the backend was made.
+    fn pressure(&self, faces: &[PressedFace]) -> Self::Pressure;
+    /// f += the forces of a pressure at displacement u.
+    fn add_pressure(&self, faces: &Self::Pressure, pressure: f64, u: &Self::Vector, f: &mut Self::Vector);
     /// Contact of the body for which the backend was made.
     fn contact(&self, contact: &Contact) -> Self::Contact;
     /// What contact does at the end of a step.

@@ -5,7 +5,7 @@
 use std::ops::Index;
 use std::sync::Arc;
 
-use tensormass_kernels::{ElementEntry, LawEntry, RestPoint};
+use tensormass_kernels::{ElementEntry, ElementInfo, LawEntry, RestPoint};
 
 use crate::contact::Contact;
 use crate::history::History;
@@ -107,6 +107,50 @@ pub struct Load {
     pub history: History,
 }
 
+/// A face that pressure acts on.
+#[derive(Debug, Clone)]
+pub struct PressedFace {
+    /// The element that it is.
+    pub kind: &'static ElementInfo,
+    /// Its nodes; their order turns to the right around the outward normal.
+    pub nodes: Vec<u32>,
+    /// At each quadrature point the derivatives of the position at rest by the two reference coordinates.
+    pub tangents: Vec<[[f64; 3]; 2]>,
+}
+
+impl PressedFace {
+    /// The forces of a pressure on the nodes, displaced by u: -p times the integrals of their functions over the face as it is
+    /// now, times its normal.
+    pub fn forces(&self, pressure: f64, u: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let mut forces = vec![[0.0; 3]; u.len()];
+        for (point, rest) in self.kind.points.iter().zip(&self.tangents) {
+            let tangent = |k: usize| -> [f64; 3] {
+                let moved = |i: usize| -> f64 {
+                    // Differences first: the motion of the whole has no digits to spare.
+                    let each = point.gradients.iter().zip(u).skip(1);
+                    each.map(|(slopes, x)| slopes[k] * (x[i] - u[0][i])).sum()
+                };
+                std::array::from_fn(|i| rest[k][i] + moved(i))
+            };
+            let (a, b) = (tangent(0), tangent(1));
+            let area = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+            for (force, function) in forces.iter_mut().zip(point.functions) {
+                (0..3).for_each(|i| force[i] -= pressure * point.weight * function * area[i]);
+            }
+        }
+        forces
+    }
+}
+
+/// Faces under one pressure, which stays normal to them while they move.
+#[derive(Debug, Clone)]
+pub struct Pressure {
+    /// The faces.
+    pub faces: Vec<PressedFace>,
+    /// The pressure over time, positive where it presses on the body.
+    pub history: History,
+}
+
 /// A body, in scaled units.
 #[derive(Debug, Clone)]
 pub struct Body {
@@ -128,6 +172,8 @@ pub struct Body {
     pub motions: Vec<History>,
     /// Loads other than the elements' own forces.
     pub loads: Vec<Load>,
+    /// Pressures on its surface.
+    pub pressures: Vec<Pressure>,
     /// What its surface may touch.
     pub contact: Option<Arc<Contact>>,
     /// Mass-proportional damping coefficient alpha.

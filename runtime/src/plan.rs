@@ -180,6 +180,9 @@ impl Plan {
         if layout == Layout::Gpu && margins > 0 {
             passes.push("elements: count of those outside their law's domain");
         }
+        if !model.body.pressures.is_empty() {
+            passes.push("faces: forces of pressure, nodes: sum");
+        }
         if viscous {
             passes.push("elements: damping forces, nodes: sum of slots");
         }
@@ -356,6 +359,8 @@ fn scope(scene: &Scene, model: &Model, implicit: bool) -> (Vec<String>, Vec<Stri
     );
     say(moving, "imposed motion".into(), "imposed motion: no boundary moves");
     say(!model.body.loads.is_empty(), format!("{} loads", model.body.loads.len()), "loads: none given");
+    let pressed: usize = model.body.pressures.iter().map(|p| p.faces.len()).sum();
+    say(pressed > 0, format!("pressure on {pressed} faces"), "pressure: none given");
     let contact = model.body.contact.as_ref();
     say(
         contact.is_some(),

@@ -69,6 +69,7 @@ pub struct System<B: Backend, F: ForceField<B>> {
     /// Contact, if there is anything to meet.
     pub touch: Option<Touch<B>>,
     loads: Vec<B::Vector>,
+    pressures: Vec<B::Pressure>,
 }
 
 /// Contact of a body on a backend.
@@ -100,7 +101,8 @@ impl<B: Backend, F: ForceField<B>> System<B, F> {
             is_looked_for: true,
             steps: 0,
         });
-        Self { backend, field, body, masses, touch, loads }
+        let pressures = body.pressures.iter().map(|p| backend.pressure(&p.faces)).collect();
+        Self { backend, field, body, masses, touch, loads, pressures }
     }
 
     /// The state at rest with this velocity everywhere, imposed components at their time-0 values.
@@ -130,6 +132,12 @@ impl<B: Backend, F: ForceField<B>> System<B, F> {
         self.backend.clear(f);
         self.field.add_force(&self.backend, u, f)?;
         self.add_loads(time, f);
+        for (pressure, faces) in self.body.pressures.iter().zip(&self.pressures) {
+            let value = pressure.history.at(time);
+            if value != 0.0 {
+                self.backend.add_pressure(faces, value, u, f);
+            }
+        }
         Ok(())
     }
 

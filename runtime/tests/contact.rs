@@ -5,7 +5,7 @@
 mod falling;
 mod support;
 
-use falling::{BELOW, CUBE, OnCpu, falling, implicit, on_cpu};
+use falling::{BELOW, CUBE, OnCpu, falling, falling_text, implicit, on_cpu};
 use support::{Random, case, done, number, outcome, probe, repository, scene};
 use tensormass_runtime::backend::{Backend, ForceField};
 use tensormass_runtime::contact::{Move, Nearest, Shape, Surface, respond};
@@ -375,4 +375,27 @@ fn moving_obstacles_push() {
                 rotate = { centre = [-0.02, 0.02, 0], axis = [0, 0, 2], angle = { ramp = [[0, 0], [0.2, -1.5707963267948966]] } }";
     let swept = probe(&run(wall), "x");
     assert!(swept < -0.005, "swept by {swept}");
+}
+
+/// Warnings of a scene with some text replaced.
+fn warned(of: &str, by: &str) -> Vec<String> {
+    let text = falling_text(CUBE, BELOW[1], "neo_hookean", "f64", 1e-4, 1e-3);
+    assert!(text.contains(of), "{text}");
+    let model = tensormass_runtime::model::build(&scene::<&str>(&text.replace(of, by), &[]));
+    model.unwrap_or_else(|e| panic!("{e}")).warnings
+}
+
+/// Lengths in mm and a stiffness in kPa are warned of, no scene of the repository is.
+#[test]
+fn units_that_look_wrong_are_warned_of() {
+    let heavy = warned("young = 3e4", "young = 30");
+    assert!(matches!(heavy.as_slice(), [one] if one.contains("presses it flat")), "{heavy:?}");
+    let far = warned("centre = [0.001, 0, -0.032], radius = 0.03", "centre = [1, 0, -320], radius = 300");
+    assert!(matches!(far.as_slice(), [one] if one.contains("obstacle.0 is 1.7e4 times as large")), "{far:?}");
+    for entry in std::fs::read_dir(repository("scenes")).expect("scenes") {
+        let path = entry.expect("an entry").path();
+        let scene = tensormass_runtime::scene::load(&path, &[]).unwrap_or_else(|e| panic!("{e}"));
+        let model = tensormass_runtime::model::build(&scene).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(model.warnings, [""; 0], "{}", path.display());
+    }
 }

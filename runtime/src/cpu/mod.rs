@@ -5,6 +5,7 @@ mod cluster;
 mod contact;
 mod field;
 mod one;
+mod pressure;
 mod tune;
 mod vectors;
 
@@ -12,6 +13,7 @@ pub use cluster::place_bytes;
 pub use contact::{CpuContact, TOUCHING_BYTES};
 pub use field::CpuField;
 pub use one::One;
+pub use pressure::CpuPressure;
 pub use tensormass_kernels::Engine;
 pub use tune::fastest;
 pub use vectors::{CpuBackend, CpuVector};

@@ -4,8 +4,9 @@ use rayon::prelude::*;
 
 use super::Precision;
 use super::contact::CpuContact;
+use super::pressure::CpuPressure;
 use crate::backend::{ALPHA, Advance, BETA, Backend, Counts, Descent, Meeting, REGISTERS, RUNNING, SUM, Update};
-use crate::body::{Body, Constraint};
+use crate::body::{Body, Constraint, PressedFace};
 use crate::contact::{Contact, Held, Passage};
 use crate::device::DeviceError;
 use crate::mass::MassMatrix;
@@ -89,6 +90,7 @@ impl<R: Precision> Backend for CpuBackend<R> {
     type Registers = [f64; REGISTERS];
     type Matrix = CpuMatrix<R>;
     type Contact = CpuContact;
+    type Pressure = CpuPressure;
 
     fn zeros(&self) -> Self::Vector {
         CpuVector(vec![[R::default(); 3]; self.places.len()])
@@ -301,6 +303,14 @@ impl<R: Precision> Backend for CpuBackend<R> {
                 *u = *u + drift * *v;
             }
         });
+    }
+
+    fn pressure(&self, faces: &[PressedFace]) -> CpuPressure {
+        CpuPressure::new(faces, &self.places)
+    }
+
+    fn add_pressure(&self, faces: &CpuPressure, pressure: f64, u: &Self::Vector, f: &mut Self::Vector) {
+        faces.add(pressure, u, f);
     }
 
     fn contact(&self, contact: &Contact) -> CpuContact {

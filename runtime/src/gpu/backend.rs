@@ -8,7 +8,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use crate::backend::{Backend, Counts, Descent, Meeting, REGISTERS, RUNNING, Update};
-use crate::body::{Body, Constraint};
+use crate::body::{Body, Constraint, PressedFace};
 use crate::contact::{Contact, Held, NUMBERS, Passage};
 use crate::device::DeviceError;
 use crate::mass::MassMatrix;
@@ -16,6 +16,7 @@ use crate::order::{DeviceOrder, placed_constraints};
 
 use super::contact::GpuContact;
 use super::device::Gpu;
+use super::pressure::GpuPressure;
 use super::recorder::{Kernel, Memory, Numbers, Recorder};
 use super::shaders::{Access, Argument, GROUP, Operation, update_arguments, update_text};
 use super::trace;
@@ -284,6 +285,7 @@ impl Backend for GpuBackend {
     type Registers = GpuRegisters;
     type Matrix = GpuMatrix;
     type Contact = GpuContact;
+    type Pressure = GpuPressure;
 
     fn zeros(&self) -> GpuVector {
         let mut x = self.vector();
@@ -471,6 +473,14 @@ impl Backend for GpuBackend {
         let storage = [&registers.0, d, q, preconditioner, x, r, z, &self.partials];
         let groups = self.run(Operation::Descend, self.numbers(0.0), &storage);
         self.sum_is_pending(groups);
+    }
+
+    fn pressure(&self, faces: &[PressedFace]) -> GpuPressure {
+        GpuPressure::new(self, faces).expect("fewer than slots of elements, which the field has bound")
+    }
+
+    fn add_pressure(&self, faces: &GpuPressure, pressure: f64, u: &GpuVector, f: &mut GpuVector) {
+        faces.add(self, pressure, u, f);
     }
 
     fn contact(&self, contact: &Contact) -> GpuContact {

@@ -53,6 +53,15 @@ pub(crate) fn point_volumes<'a>(
     })
 }
 
+/// The derivatives of the position by the two reference coordinates of a face, from the derivatives of its functions.
+pub fn tangents(slopes: &[[f64; 3]], positions: &[[f64; 3]]) -> [[f64; 3]; 2] {
+    // From one node on: a face far from the origin loses no digits.
+    let along = |k: usize, i: usize| -> f64 {
+        slopes.iter().zip(positions).map(|(s, x)| s[k] * (x[i] - positions[0][i])).sum()
+    };
+    [0, 1].map(|k| std::array::from_fn(|i| along(k, i)))
+}
+
 /// The integral of each node's function over a face (m2), or over an edge of a plane body (m, which is m2 of unit
 /// thickness).
 pub fn integrals(info: &ElementInfo, positions: &[[f64; 3]]) -> Vec<f64> {

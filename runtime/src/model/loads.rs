@@ -1,7 +1,7 @@
 //! Loads as nodal forces: weight, tractions on boundary faces, forces at nodes.
 
 use super::place::Places;
-use crate::body::{Load, Rows};
+use crate::body::{Load, PressedFace, Pressure, Rows};
 use crate::history::History;
 use tensormass_kernels::RestPoint;
 
@@ -45,6 +45,8 @@ pub fn loads(
                 }
                 ramp
             }
+            // It depends on the displacement: see [`pressures`].
+            scene::Load::Pressure { .. } => continue,
             scene::Load::Force { nodes, value, total, ramp } => {
                 let nodes = places.nodes(scene, &format!("load.{i}.nodes"), nodes)?;
                 let each = match (value, total) {
@@ -64,6 +66,33 @@ pub fn loads(
         loads.push(Load { forces, history: history.scaled(1.0 / scale.time, 1.0) });
     }
     Ok(loads)
+}
+
+/// The pressures of a scene, in scaled units.
+pub fn pressures(scene: &Scene, mesh: &Mesh, places: &Places, scale: &Scale) -> Result<Vec<Pressure>, SceneError> {
+    let mut pressures = vec![];
+    for (i, load) in scene.load.iter().enumerate() {
+        let scene::Load::Pressure { faces, value, ramp } = load else { continue };
+        if mesh.blocks()[0].info().dimension == 2 {
+            let reason = "pressure acts on solid bodies, and this one is plane";
+            let remedy = "give a traction, or a body of solid elements";
+            return Err(SceneError::at(scene.locate(&format!("load.{i}.kind")), reason, remedy));
+        }
+        let faces = places.faces(scene, &format!("load.{i}.faces"), faces)?;
+        let pressed = |face: mesh::FaceId| {
+            let (kind, nodes) = (mesh.face_kind(face), mesh.face_nodes(face));
+            let scaled: Vec<[f64; 3]> =
+                mesh.positions(&nodes).into_iter().map(|x| x.map(|x| x / scale.length)).collect();
+            let tangents = kind.points.iter().map(|point| mesh::tangents(point.gradients, &scaled)).collect();
+            PressedFace { kind, nodes: nodes.iter().map(|n| n.0).collect(), tangents }
+        };
+        let history = ramp.as_ref().map_or_else(|| History::constant(1.0), scene::Ramp::table);
+        pressures.push(Pressure {
+            faces: faces.into_iter().map(pressed).collect(),
+            history: history.scaled(1.0 / scale.time, value / scale.stress),
+        });
+    }
+    Ok(pressures)
 }
 
 /// What each node bears of a body force of unit acceleration: the integral of its function times the density. Linear

@@ -9,6 +9,7 @@ mod material;
 mod obstacle;
 mod parameters;
 pub(crate) mod place;
+mod units;
 
 use std::sync::Arc;
 
@@ -118,6 +119,8 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
         _ => mass_matrix.as_ref().map_or_else(|| masses.clone(), MassMatrix::row_sums),
     };
     let loads = loads::loads(scene, &mesh, &places, &scale, &weights)?;
+    let pressures = loads::pressures(scene, &mesh, &places, &scale)?;
+    warnings.extend(units::warnings(scene, &mesh, assignment.stiffness(), assignment.density()));
     let contact = obstacle::contact(scene, &mesh, &constraints, &scale)?;
     let recorder = Recorder::new(scene, &mesh, &places, &constraints)?;
     let velocity = scene.initial.velocity.map(|v| v / scale.velocity());
@@ -131,6 +134,7 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
         constraints,
         motions,
         loads,
+        pressures,
         contact: contact.map(Arc::new),
         mass_damping: scene.solver.mass_damping * scale.time,
         stiffness_damping: scene.solver.stiffness_damping / scale.time,

@@ -2,12 +2,10 @@
 
 use super::document::{Document, Node};
 use super::error::{Location, SceneError};
-use super::model::{
-    Boundary, History, Integrator, Load, Mass, Mesh, Motion, Parameter, ParameterValue, PerElement, Ramp, SceneData,
-    Solver,
-};
+use super::model::{Boundary, History, Load, Mesh, Motion, Parameter, ParameterValue, PerElement, Ramp, SceneData};
 use super::obstacle::{Angle, Friction, Obstacle, Rotate};
 use super::shape::written;
+use super::solver::{Integrator, Mass, Solver};
 
 /// Steps of a run, at most.
 const MOST_STEPS: f64 = 1e9;
@@ -203,7 +201,7 @@ impl Context<'_> {
 
     fn load(&self, load: &Load, path: &str) -> Result<(), SceneError> {
         let ramp = match load {
-            Load::Gravity { ramp, .. } | Load::Traction { ramp, .. } => ramp,
+            Load::Gravity { ramp, .. } | Load::Traction { ramp, .. } | Load::Pressure { ramp, .. } => ramp,
             Load::Force { value, total, ramp, .. } => {
                 match (value, total) {
                     (Some(_), Some(_)) => return Err(self.later(path, ["value", "total"])),

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | `document` | text, overrides | tree in which each key and value knows its place |
 //! | `shape` | tree, JSON schema | the tree, with keys, types, names and ranges checked |
-//! | `model`, `output` | tree | typed data, by serde |
+//! | `model`, `obstacle`, `solver`, `output` | tree | typed data, by serde |
 //! | `check` | typed data, tree | what no schema can say: unique names, increasing times, .. |
 //!
 //! Laws, groups of the mesh and files beside the scene are looked up by later stages; they report what they miss with
@@ -21,13 +21,13 @@ mod predicate;
 mod schema;
 mod selection;
 mod shape;
+mod solver;
 mod suggest;
 
 pub use error::{Fault, Location, SceneError};
 pub use model::{
-    About, Axis, Beam, Boundary, ConjugateGradient, History, Initial, Integrator, Load, Mass, Material, Mesh, Motion,
-    Newton, Parameter, ParameterValue, PerElement, Precision, Preconditioner, Ramp, SceneData, Solver, TangentChoice,
-    Torus,
+    About, Axis, Beam, Boundary, History, Initial, Load, Material, Mesh, Motion, Parameter, ParameterValue, PerElement,
+    Ramp, SceneData, Torus,
 };
 pub use obstacle::{Angle, Friction, Obstacle, Rod, Rotate, Shape};
 pub use output::{Component, EnergyPart, Field, Output, Probe, Statistic, StressComponent};
@@ -35,6 +35,7 @@ pub use overrides::Override;
 pub use predicate::{ExpressionError, Predicate};
 pub use schema::json_schema;
 pub use selection::{BoundingBox, Selection, SelectionKind};
+pub use solver::{ConjugateGradient, Integrator, Mass, Newton, Precision, Preconditioner, Solver, TangentChoice};
 
 use document::Document;
 use std::ops::Deref;

@@ -1,4 +1,4 @@
-//! What a scene says: mesh, materials, boundary conditions, loads, initial state, solver.
+//! What a scene says: mesh, materials, boundary conditions, loads, initial state.
 //!
 //! These types are read by serde, and the JSON schema that checks scene text is made from them; a range written here
 //! is therefore the range that is enforced and the range that is documented. All quantities are in SI units.
@@ -6,6 +6,7 @@
 use super::obstacle::{Obstacle, Rotate};
 use super::output::{Output, Probe};
 use super::selection::Selection;
+use super::solver::Solver;
 use crate::history::History as Table;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -349,7 +350,7 @@ impl JsonSchema for Ramp {
     }
 }
 
-/// A force from outside. Loads add up; all of them keep their direction while the body moves.
+/// A force from outside. Loads add up; all of them but pressure keep their direction while the body moves.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Load {
@@ -369,6 +370,17 @@ pub enum Load {
         /// Force for each area at rest in Pa, each component within +-1e15.
         #[schemars(inner(range(min = -1e15, max = 1e15)))]
         value: [f64; 3],
+        /// A factor over time, instead of 1.
+        #[serde(default)]
+        ramp: Option<Ramp>,
+    },
+    /// A pressure on faces of the body's surface, normal to them and for each area as they are while the body moves.
+    Pressure {
+        /// The faces; expressions and boxes test a face's centroid at rest.
+        faces: Selection,
+        /// The pressure in Pa, positive where it presses on the body, within +-1e15.
+        #[schemars(range(min = -1e15, max = 1e15))]
+        value: f64,
         /// A factor over time, instead of 1.
         #[serde(default)]
         ramp: Option<Ramp>,
@@ -395,9 +407,10 @@ impl Load {
     /// The factor of 1 that the load has at a time in s.
     pub fn factor(&self, time: f64) -> f64 {
         match self {
-            Self::Gravity { ramp, .. } | Self::Traction { ramp, .. } | Self::Force { ramp, .. } => {
-                ramp.as_ref().map_or(1.0, |ramp| ramp.table().at(time))
-            }
+            Self::Gravity { ramp, .. }
+            | Self::Traction { ramp, .. }
+            | Self::Pressure { ramp, .. }
+            | Self::Force { ramp, .. } => ramp.as_ref().map_or(1.0, |ramp| ramp.table().at(time)),
         }
     }
 }
@@ -410,204 +423,6 @@ pub struct Initial {
     #[serde(default)]
     #[schemars(inner(range(min = -1e6, max = 1e6)))]
     pub velocity: [f64; 3],
-}
-
-/// How a step is taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Integrator {
-    /// Implicit Euler: unconditionally stable for a convex energy, dissipative, first order.
-    ImplicitEuler,
-    /// Semi-implicit (symplectic) Euler: explicit, stable below the critical step, first order.
-    SemiImplicitEuler,
-    /// Central differences with mass damping: explicit, stable below the critical step, second order.
-    CentralDifference,
-    /// Equilibrium without inertia.
-    Static,
-}
-
-impl Integrator {
-    /// Whether steps take forces as they are, and solve for nothing.
-    pub fn is_explicit(self) -> bool {
-        match self {
-            Self::SemiImplicitEuler | Self::CentralDifference => true,
-            Self::ImplicitEuler | Self::Static => false,
-        }
-    }
-}
-
-/// The number type of state and kernels.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Precision {
-    /// 32 bits, about 7 digits; every GPU has it.
-    F32,
-    /// 64 bits, about 16 digits.
-    #[default]
-    F64,
-}
-
-impl Precision {
-    /// Bytes of a number.
-    pub fn bytes(self) -> usize {
-        match self {
-            Self::F32 => 4,
-            Self::F64 => 8,
-        }
-    }
-}
-
-/// How inertia is spread over the nodes.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Mass {
-    /// A mass at each node.
-    #[default]
-    Lumped,
-    /// The integrals of products of the interpolation functions, a sparse matrix: motion as accurate as the element.
-    Consistent,
-}
-
-/// How the equations of motion or of equilibrium are solved.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Solver {
-    /// How a step is taken.
-    pub integrator: Integrator,
-    /// Time step in s, above 0, at most 1e6. Needed unless the integrator is `static`, where it divides `duration`
-    /// into increments.
-    #[serde(default)]
-    #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0.0))]
-    pub step: Option<f64>,
-    /// Simulated time in s, above 0, at most 1e9. Needed unless the integrator is `static`, where it is the time of
-    /// the ramps at which equilibrium is sought (without it: when all ramps have ended).
-    #[serde(default)]
-    #[schemars(range(max = 1e9), extend("exclusiveMinimum" = 0.0))]
-    pub duration: Option<f64>,
-    /// The number type of state and kernels.
-    #[serde(default)]
-    pub precision: Precision,
-    /// How inertia is spread over the nodes; explicit integrators need `lumped`, `static` has no inertia.
-    #[serde(default)]
-    pub mass: Mass,
-    /// Mass-proportional damping alpha in 1/s, from 0 to 1e9; `static` has none. With `stiffness_damping`, Rayleigh's
-    /// C = alpha M + beta K.
-    #[serde(default)]
-    #[schemars(range(min = 0.0, max = 1e9))]
-    pub mass_damping: f64,
-    /// Stiffness-proportional damping beta in s, from 0 to 1e6; `static` has none.
-    #[serde(default)]
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub stiffness_damping: f64,
-    /// The linear solver of `implicit-euler` and `static`.
-    #[serde(default)]
-    pub cg: ConjugateGradient,
-    /// The nonlinear solver of `implicit-euler` and `static`.
-    #[serde(default)]
-    pub newton: Newton,
-    /// CPU threads, from 0 to 1024; 0 takes all cores. Results do not depend on it.
-    #[serde(default)]
-    #[schemars(range(min = 0, max = 1024))]
-    pub threads: u32,
-}
-
-impl Solver {
-    /// Number of steps (of increments if `static`): `duration / step`, rounded up but for rounding errors. 1 for
-    /// `static` without a step. The simulated time is this times the step.
-    pub fn steps(&self) -> u64 {
-        match (self.duration, self.step) {
-            (Some(duration), Some(step)) => ((duration / step) * (1.0 - 1e-9)).ceil().max(1.0) as u64,
-            _ => 1,
-        }
-    }
-}
-
-/// The linear solver: conjugate gradients.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct ConjugateGradient {
-    /// Stop when the residual's norm has fallen by this factor; above 0, below 1. Newton's method on a nonlinear law asks
-    /// for less where less is enough.
-    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
-    pub tolerance: f64,
-    /// Most iterations in one solution, from 1 to 1000000.
-    #[schemars(range(min = 1, max = 1_000_000))]
-    pub max_iterations: u32,
-    /// What the residual is multiplied by before each search direction.
-    pub preconditioner: Preconditioner,
-    /// How products with the tangent are computed on a CPU; results depend on it in their last digits only.
-    pub tangent: TangentChoice,
-}
-
-impl Default for ConjugateGradient {
-    fn default() -> Self {
-        Self {
-            tolerance: 1e-6,
-            max_iterations: 2000,
-            preconditioner: Preconditioner::Jacobi,
-            tangent: TangentChoice::Auto,
-        }
-    }
-}
-
-/// A preconditioner of conjugate gradients.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Preconditioner {
-    /// The inverse of the matrix's diagonal.
-    Jacobi,
-    /// None.
-    None,
-}
-
-/// How products with the tangent are computed on a CPU.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum TangentChoice {
-    /// As a fixed rule has it, for each law by its operations and the size of the body.
-    Auto,
-    /// What does not depend on the increment is stored once an iteration of Newton's method.
-    Stored,
-    /// Everything is computed in each product.
-    Recomputed,
-    /// A matrix is assembled once an iteration of Newton's method. In f32 that loses digits where stiffnesses differ.
-    Assembled,
-    /// As is faster: measured before the first step. Two runs may then differ in their last digits.
-    Measured,
-}
-
-impl TangentChoice {
-    /// All choices.
-    pub const ALL: [Self; 5] = [Self::Auto, Self::Stored, Self::Recomputed, Self::Assembled, Self::Measured];
-
-    /// Its name in scenes.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Auto => "auto",
-            Self::Stored => "stored",
-            Self::Recomputed => "recomputed",
-            Self::Assembled => "assembled",
-            Self::Measured => "measured",
-        }
-    }
-}
-
-/// The nonlinear solver: Newton's method.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Newton {
-    /// Stop when the residual's norm has fallen by this factor within the step; above 0, below 1.
-    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
-    pub tolerance: f64,
-    /// Most iterations in one step, from 1 to 10000; 1 takes one linearised step and asks for no convergence.
-    #[schemars(range(min = 1, max = 10_000))]
-    pub max_iterations: u32,
-}
-
-impl Default for Newton {
-    fn default() -> Self {
-        Self { tolerance: 1e-9, max_iterations: 30 }
-    }
 }
 
 fn one() -> f64 {

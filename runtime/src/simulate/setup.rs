@@ -26,9 +26,10 @@ pub(super) fn stepping(scene: &Scene) -> (f64, u64) {
 /// The time in s at which the last ramp of a scene ends.
 fn ramps_end(scene: &Scene) -> f64 {
     let loads = scene.load.iter().filter_map(|l| match l {
-        scene::Load::Gravity { ramp, .. } | scene::Load::Traction { ramp, .. } | scene::Load::Force { ramp, .. } => {
-            ramp.as_ref().map(scene::Ramp::end)
-        }
+        scene::Load::Gravity { ramp, .. }
+        | scene::Load::Traction { ramp, .. }
+        | scene::Load::Pressure { ramp, .. }
+        | scene::Load::Force { ramp, .. } => ramp.as_ref().map(scene::Ramp::end),
     });
     let motions = scene.boundary.iter().flat_map(|b| match b {
         scene::Boundary::Fixed { .. } => vec![],

@@ -77,6 +77,7 @@ pub fn body(elements: Rows<u32>, rest: &Rows<RestPoint<f64>>, batches: Vec<LawBa
         constraints: vec![],
         motions: vec![],
         loads: vec![],
+        pressures: vec![],
         contact: None,
         mass_damping: 0.0,
         stiffness_damping: 0.0,

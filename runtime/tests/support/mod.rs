@@ -248,6 +248,7 @@ pub fn body(mesh: &Mesh, law: &'static LawEntry, parameters: &[f64], imposed: &[
         constraints: imposed.iter().enumerate().map(constraint).collect(),
         motions: imposed.iter().map(|&(_, _, value)| History::constant(value)).collect(),
         loads: vec![],
+        pressures: vec![],
         contact: None,
         mass_damping: 0.0,
         stiffness_damping: 0.0,
