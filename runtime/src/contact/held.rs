@@ -49,7 +49,7 @@ pub struct Attempt<'a> {
     pub u: &'a [[f64; 3]],
     /// What the step adds to them.
     pub by: &'a [[f64; 3]],
-    /// Impulses on them that the solution leaves open: those that hold what is held.
+    /// Impulses on them that the solution leaves open: those that hold what is held, in components that no support holds.
     pub impulses: &'a [[f64; 3]],
 }
 
@@ -109,9 +109,7 @@ impl Holding {
         let mut kept = vec![];
         for mut held in std::mem::take(&mut self.held) {
             let (node, Obstacle { sticking, sliding, .. }) = (held.node as usize, &contact.obstacles[held.obstacle]);
-            // What supports hold is not the obstacle's.
-            let free = contact.free[held.index];
-            let impulse = std::array::from_fn(|i| if free[i] { impulses[node][i] } else { 0.0 });
+            let impulse = impulses[node];
             let pressing = dot(impulse, held.normal);
             if pressing < -1e-9 * largest && self.times_let_go(held.index) < CHANGES {
                 self.let_go.push((held.index, self.times_let_go(held.index) + 1));

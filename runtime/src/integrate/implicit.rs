@@ -122,7 +122,9 @@ impl<B: Backend> ImplicitEuler<B> {
             impulses.resize(v.len(), [0.0; 3]);
             let mut total = vec![[0.0; 3]; v.len()];
             for held in holding.held() {
-                let node = held.node as usize;
+                let (node, free) = (held.node as usize, contact.free[held.index]);
+                // What supports hold is not the obstacle's.
+                (0..3).filter(|i| !free[*i]).for_each(|i| impulses[node][i] = 0.0);
                 total[node] = std::array::from_fn(|i| impulses[node][i] + held.friction[i]);
             }
             let goes_on = holding.look(contact, &passages, &Attempt { u: &u, by: &by, impulses: &impulses }, tolerance);
