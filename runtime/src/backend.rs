@@ -5,6 +5,8 @@
 //! order. To return one, a device has to be waited for; a solver that needs scalars in every iteration keeps them in
 //! [`Backend::Registers`], where the vectors live, and gives its recurrences as [`Update`]s.
 
+use std::sync::Arc;
+
 use crate::body::PressedFace;
 use crate::contact::{Contact, Held, Passage};
 use crate::device::DeviceError;
@@ -183,6 +185,10 @@ pub trait Backend {
     fn pressure(&self, faces: &[PressedFace]) -> Self::Pressure;
     /// f += the forces of a pressure at displacement u.
     fn add_pressure(&self, faces: &Self::Pressure, pressure: f64, u: &Self::Vector, f: &mut Self::Vector);
+    /// Contact as this backend can compute it.
+    fn contact_here(&self, contact: Arc<Contact>) -> Arc<Contact> {
+        contact
+    }
     /// Contact of the body for which the backend was made.
     fn contact(&self, contact: &Contact) -> Self::Contact;
     /// What contact does at the end of a step.

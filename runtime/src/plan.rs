@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 use tensormass_kernels::{ElementInfo, LawEntry, LawInfo, pairs};
 
 use crate::body::LawBatch;
+use crate::contact::{Grid, Shape};
 use crate::cpu::{TOUCHING_BYTES, place_bytes};
 use crate::mesh::Quality;
 use crate::model::Model;
@@ -116,6 +117,15 @@ impl Plan {
         let frames_show = |field| scene.output.frames != Some(0) && scene.output.fields.contains(&field);
         let impulses = model.body.contact.is_some() && (model.recorder.needs().contact || frames_show(Field::Contact));
         let touching = model.body.contact.as_ref().map_or(0, |contact| contact.nodes.len());
+        // Of a face under pressure: its nodes and tangents at rest; on a GPU slots too, and where each node finds its own.
+        let pressed = || model.body.pressures.iter().flat_map(|p| &p.faces);
+        let shapes = || model.body.contact.iter().flat_map(|contact| &contact.obstacles).map(|o| &o.shape);
+        let grids: Vec<(usize, Grid)> = match layout {
+            Layout::Cpu => vec![],
+            Layout::Gpu => {
+                shapes().enumerate().filter_map(|(i, shape)| Some((i, Grid::bake(shape.solid()?)))).collect()
+            }
+        };
         let vectors = if implicit { 20 + 2 * usize::from(viscous || proportional) } else { 6 } + usize::from(impulses);
         let constants: usize = model.body.batches.iter().map(|b| b.constants.len()).sum();
         let with_domain = model.body.batches.iter().filter(|b| b.law.info.domain.is_some());
@@ -155,6 +165,11 @@ impl Plan {
                     ("state and work vectors", vectors * 3 * real * nodes),
                     ("consistent mass", (4 + real) * entries + 4 * rows),
                     ("nodes of the surface", TOUCHING_BYTES * touching),
+                    (
+                        "faces under pressure",
+                        pressed().map(|f| size_of_val(f) + 4 * f.nodes.len() + size_of_val(&*f.tangents)).sum(),
+                    ),
+                    ("triangles of obstacles", shapes().map(Shape::bytes).sum()),
                 ]
             }
             Layout::Gpu => {
@@ -172,6 +187,11 @@ impl Plan {
                     ("state and work vectors", (vectors + 1) * 16 * nodes),
                     ("consistent mass", 8 * entries + 4 * rows),
                     ("nodes of the surface", 16 * touching),
+                    ("faces under pressure", pressed().map(|f| 40 * f.nodes.len() + 32 * f.tangents.len()).sum()),
+                    (
+                        "grids of distances from obstacles",
+                        grids.iter().map(|(_, grid)| size_of_val(grid.values())).sum(),
+                    ),
                 ]
             }
         };
@@ -232,7 +252,14 @@ impl Plan {
         if model.body.contact.is_some() {
             passes.push("nodes of the surface: contact, while an obstacle can be met");
         }
-        let (modelled, left_out) = scope(scene, model, implicit);
+        let (mut modelled, left_out) = scope(scene, model, implicit);
+        modelled.extend(grids.iter().map(|(i, grid)| {
+            format!(
+                "obstacle.{i} as a grid of distances: cells of {:.2e} m, its surface off by {:.1e} m at most",
+                grid.cell() * model.scale.length,
+                grid.error() * model.scale.length
+            )
+        }));
         Self { laws, passes, buffers, elements, quality: model.quality, modelled, left_out }
     }
 

@@ -1,8 +1,10 @@
 //! Probes: numbers read off a state, by name.
 
-use crate::body::Constraint;
-use crate::mesh::{ElementId, Mesh, integrals};
+use crate::body::{Constraint, LawBatch};
+use crate::cpu::One;
+use crate::mesh::{ElementId, MaterialPoint, Mesh, integrals};
 use crate::model::place::Places;
+use crate::scale::Scale;
 use crate::scene::{Component, EnergyPart, Probe, Scene, SceneError, Statistic, StressComponent};
 
 /// Energies of the whole body in J.
@@ -62,6 +64,7 @@ enum Reader {
     Energy(EnergyPart),
     Volume(Vec<u32>),
     Stress { elements: Vec<u32>, component: StressComponent, statistic: Statistic },
+    PointStress { at: MaterialPoint, law: One, unit: f64, component: StressComponent },
 }
 
 /// The probes of a scene, resolved on its mesh.
@@ -79,6 +82,8 @@ impl Recorder {
         mesh: &Mesh,
         places: &Places,
         constraints: &[Constraint],
+        batches: &[LawBatch],
+        scale: &Scale,
     ) -> Result<Self, SceneError> {
         let held = |node: u32| constraints.iter().any(|c| c.node == node);
         let supported = |path: &str, nodes: &[u32]| {
@@ -140,6 +145,18 @@ impl Recorder {
                     component: *component,
                     statistic: *statistic,
                 },
+                Probe::PointStress { point, component, .. } => {
+                    let at = mesh.material_point(*point).ok_or_else(|| {
+                        let [x, y, z] = point;
+                        SceneError::at(
+                            scene.locate(&path("point")),
+                            format!("no element contains the point ({x}, {y}, {z})"),
+                            "give a point inside the body at rest, in m",
+                        )
+                    })?;
+                    let law = law_at(at.element, batches).expect("each element has a law");
+                    Reader::PointStress { at, law, unit: scale.stress, component: *component }
+                }
             };
             readers.push(reader);
         }
@@ -158,7 +175,9 @@ impl Recorder {
         let mut needs = Needs::default();
         for reader in &self.readers {
             match reader {
-                Reader::Displacement { .. } | Reader::Volume(_) => needs.displacement = true,
+                Reader::Displacement { .. } | Reader::Volume(_) | Reader::PointStress { .. } => {
+                    needs.displacement = true
+                }
                 Reader::Reaction { .. } => needs.reactions = true,
                 Reader::Contact { .. } => needs.contact = true,
                 Reader::Modulus { .. } => {
@@ -207,8 +226,22 @@ impl Recorder {
                     .map(|&e| (of_stress(&state.stresses[e as usize], *component), self.volumes[e as usize]));
                 reduce(values, *statistic)
             }
+            Reader::PointStress { at, law, unit, component } => {
+                let g = at.displacement_gradient(mesh, &state.displacement);
+                of_stress(&law.cauchy(&g).map(|x| x * unit), *component)
+            }
         }
     }
+}
+
+/// The law of an element, alone.
+fn law_at(element: ElementId, batches: &[LawBatch]) -> Option<One> {
+    batches.iter().find_map(|batch| {
+        let index = batch.elements.iter().position(|e| *e == element.0)?;
+        let count = batch.law.info.constants.len();
+        let start = if batch.per_element { index * count } else { 0 };
+        Some(One::point(batch.law, &batch.constants[start..start + count]))
+    })
 }
 
 fn mean(nodes: &[u32], value: impl Fn(u32) -> f64) -> f64 {

@@ -89,7 +89,8 @@ const DIVERGED: f64 = 1e4;
 
 impl<B: Backend, F: ForceField<B>> System<B, F> {
     /// Puts a body on a backend.
-    pub fn new(backend: B, field: F, body: Body) -> Self {
+    pub fn new(backend: B, field: F, mut body: Body) -> Self {
+        body.contact = body.contact.map(|contact| backend.contact_here(contact));
         let masses = match &body.mass_matrix {
             Some(matrix) => Masses::consistent(&backend, matrix),
             None => Masses::lumped(backend.upload(&body.masses.iter().map(|&m| [m; 3]).collect::<Vec<_>>())),

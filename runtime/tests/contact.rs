@@ -8,18 +8,18 @@ mod support;
 use falling::{BELOW, CUBE, OnCpu, falling, falling_text, implicit, on_cpu};
 use support::{Random, case, done, number, outcome, probe, repository, scene};
 use tensormass_runtime::backend::{Backend, ForceField};
-use tensormass_runtime::contact::{Move, Nearest, Shape, Surface, respond};
+use tensormass_runtime::contact::{Approach, Convex, Move, Nearest, Response, Surface, meets, respond};
 use tensormass_runtime::cpu::Precision;
 use tensormass_runtime::simulate::Outcome;
 use tensormass_runtime::system::System;
 
-const SHAPES: [(&str, Shape); 6] = [
-    ("plane", Shape::Plane),
-    ("sphere", Shape::Capsule { half: 0.0, radius: 0.7 }),
-    ("capsule", Shape::Capsule { half: 0.5, radius: 0.4 }),
-    ("box", Shape::Box { half: [0.6, 0.3, 0.5] }),
-    ("cylinder", Shape::Cylinder { half: 0.4, radius: 0.6 }),
-    ("disc", Shape::Cylinder { half: 0.01, radius: 0.8 }),
+const SHAPES: [(&str, Convex); 6] = [
+    ("plane", Convex::Plane),
+    ("sphere", Convex::Capsule { half: 0.0, radius: 0.7 }),
+    ("capsule", Convex::Capsule { half: 0.5, radius: 0.4 }),
+    ("box", Convex::Box { half: [0.6, 0.3, 0.5] }),
+    ("cylinder", Convex::Cylinder { half: 0.4, radius: 0.6 }),
+    ("disc", Convex::Cylinder { half: 0.01, radius: 0.8 }),
 ];
 
 /// A point within +-2.
@@ -33,6 +33,12 @@ fn length(x: [f64; 3]) -> f64 {
 
 fn along(x: [f64; 3], by: [f64; 3], t: f64) -> [f64; 3] {
     std::array::from_fn(|i| x[i] + t * by[i])
+}
+
+/// The response of a shape to a move.
+fn answer(shape: Convex, node: Move<f64>, surface: Surface<f64>) -> Response<f64> {
+    let met = meets(|x| shape.nearest(x), Approach::Tangents, node, surface.tolerance);
+    respond(met, node, surface)
 }
 
 /// The point of the surface below a point is at distance 0 and as far as the distance says, nothing of the shape is nearer, and
@@ -73,7 +79,7 @@ fn a_response_keeps_out_and_gives_no_energy() {
             }
             for friction in [0.0, 0.3, 1e6] {
                 let surface = Surface { sticking: friction, sliding: 0.9 * friction, tolerance };
-                let response = respond(|x| shape.nearest(x), Move { from, by }, surface);
+                let response = answer(shape, Move { from, by }, surface);
                 assert_eq!(response.push, [0.0; 3], "{name}: nothing was inside");
                 let after = along(by, response.change, 1.0);
                 let end = shape.nearest::<f64>(along(from, after, 1.0)).distance;
@@ -106,7 +112,7 @@ fn friction_is_coulombs() {
             let by = [tangential * f64::cos(angle), tangential * f64::sin(angle), -normal];
             let node = Move { from: [0.4, -0.2, 0.0], by };
             let surface = Surface { sticking, sliding, tolerance: 1e-15 };
-            let after = along(by, respond(|x| Shape::Plane.nearest(x), node, surface).change, 1.0);
+            let after = along(by, answer(Convex::Plane, node, surface).change, 1.0);
             let left = if tangential <= sticking * normal { 0.0 } else { tangential - sliding * normal };
             let wanted = [left * f64::cos(angle), left * f64::sin(angle), 0.0];
             assert!(

@@ -59,6 +59,7 @@ fn check(text: &str, out: &str, expected: &str) -> String {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let at = folder.path();
     fs::write(at.join("inverted.msh"), INVERTED).expect("a mesh file");
+    fs::write(at.join("open.obj"), "v 0 0 -1\nv 1 0 -1\nv 0 1 -1\nf 1 2 3\n").expect("a surface");
     fs::write(at.join("values.csv"), "1e6\n".repeat(24)).expect("a table");
     fs::write(at.join("zero.csv"), format!("{}0, 0, -0.0\n", "0, 0, 1  # upright\n".repeat(23))).expect("a table");
     let out = at.join(out);

@@ -7,10 +7,11 @@ mod support;
 
 use std::sync::Arc;
 
-use falling::{BELOW, Bench, CUBE, falling, falling_text, on_cpu};
+use falling::{BELOW, Bench, CUBE, DISH, MESHES, falling, falling_text, tabulated};
 use support::gpu::test_device;
 use support::{Random, done, overrides, repository, scene};
 use tensormass_runtime::backend::{Backend, Meeting};
+use tensormass_runtime::contact::Shape;
 use tensormass_runtime::gpu::{Gpu, GpuBackend, GpuField, GpuOptions};
 use tensormass_runtime::scene::{Scene, load};
 use tensormass_runtime::simulate::{Ending, Outcome, Silent, run_on};
@@ -38,10 +39,11 @@ const MOVING: &str = "{ box = { centre = [0, 0, -0.01], size = [0.05, 0.05, 0.01
                       shape = { sphere = { centre = [0, 0.03, 0], radius = 0.015 } }";
 
 /// One step's contact from random displacements and velocities: the response of the device is that of the CPU, to some roundings
-/// of the scene's size for displacements and of that over the step for velocities; both in f32.
+/// of the scene's size for displacements and of that over the step for velocities; both in f32. Normals of a grid of distances
+/// jump from cell to cell: of nodes that meet one up to a hundredth may do otherwise.
 fn check_response(gpu: &Arc<Gpu>, shape: &str) {
     let scene = falling(CUBE, shape, "hooke", "f32", 5e-5, 0.06);
-    let (device, cpu) = (on_gpu(gpu, &scene), on_cpu::<f32>(&scene));
+    let (device, cpu) = (on_gpu(gpu, &scene), tabulated::<f32>(&scene));
     let contact = device.system.body.contact.clone().expect("an obstacle");
     let (mut rng, h) = (Random(5), 0.01);
     let nodes = device.system.body.masses.len();
@@ -50,18 +52,22 @@ fn check_response(gpu: &Arc<Gpu>, shape: &str) {
         (0..nodes).map(|_| std::array::from_fn(|_| size * rng.next())).collect()
     };
     let passages = contact.passages(0.3, 0.3 + h);
-    let mut touched = 0;
+    let (mut touched, mut apart) = (0, 0);
+    let jumps = contact.obstacles.iter().any(|o| matches!(o.shape, Shape::Grid(_)));
     for _ in 0..100 {
         let (u, v) = (vector(&mut rng, near), vector(&mut rng, near / h));
         let device = meet(&device.system.backend, &contact, &passages, h, &u, &v);
         let wanted = meet(&cpu.system.backend, &contact, &passages, h, &u, &v);
         let allowed = 64.0 * f64::from(f32::EPSILON) * contact.size;
         for node in 0..nodes {
+            let before = apart;
             for c in 0..3 {
                 let [du, dv, di] = [0, 1, 2].map(|k| (device[k][node][c] - wanted[k][node][c]).abs());
                 let mass = wanted[2][node][c].abs() / (1e-30 + (wanted[1][node][c] - v[node][c]).abs());
+                let is_same = du <= allowed && dv * h <= allowed && di * h <= allowed * (1.0 + mass);
+                apart = apart.max(before + usize::from(!is_same));
                 assert!(
-                    du <= allowed && dv * h <= allowed && di * h <= allowed * (1.0 + mass),
+                    is_same || jumps,
                     "{shape}, node {node}, {:?} by {:?}: u {:?} for {:?}, v {:?} for {:?}",
                     u[node],
                     v[node],
@@ -74,7 +80,8 @@ fn check_response(gpu: &Arc<Gpu>, shape: &str) {
             touched += usize::from(length(wanted[2][node]) > 0.0);
         }
     }
-    assert!(touched > 100, "{shape}: {touched} nodes met something");
+    eprintln!("{shape}: {apart} of {touched} do otherwise");
+    assert!(touched > 100 && apart <= touched / 100, "{shape}: {touched} nodes met something, {apart} do otherwise");
 }
 
 fn length(x: [f64; 3]) -> f64 {
@@ -108,25 +115,33 @@ fn meet<B: Backend>(
 #[test]
 fn responses_are_those_of_the_cpu() {
     let Some(gpu) = test_device().map(Arc::new) else { return };
-    for shape in BELOW.into_iter().chain([MOVING]) {
+    for shape in BELOW.into_iter().chain(MESHES).chain([DISH, MOVING]) {
         check_response(&gpu, shape);
     }
 }
 
-/// No step ends deeper than 4 roundings of the scene's size, as on the CPU; gaps are those of the CPU.
+/// No step ends deeper than 4 roundings of the scene's size, as on the CPU; on a grid of distances than a hundredth of a cell.
 #[test]
 fn no_step_ends_inside() {
     let Some(gpu) = test_device().map(Arc::new) else { return };
-    for shape in BELOW {
+    for shape in BELOW.into_iter().chain(MESHES).chain([DISH]) {
         let scene = falling(CUBE, shape, "neo_hookean", "f32", 2e-4, 0.06);
         let (mut device, mut touched) = (on_gpu(&gpu, &scene), 0);
+        let contact = device.system.body.contact.clone().expect("an obstacle");
+        let roundings = 4.0 * device.system.backend.epsilon() * device.size;
+        let deepest = match &contact.obstacles[0].shape {
+            Shape::Grid(grid) => -0.01 * grid.cell(),
+            _ => -roundings,
+        };
+        let mut least = f64::INFINITY;
         for step in 0..device.steps {
             let [before, after] = device.step();
             let gap = device.gap();
-            let deepest = -4.0 * device.system.backend.epsilon() * device.size;
+            least = least.min(gap);
             assert!(gap >= deepest, "{shape}, step {step}: {:e} deep", -gap / device.size);
             touched += usize::from(before != after);
         }
+        eprintln!("{shape}: {:.2} of what is allowed", least / deepest);
         assert!(touched > 20, "{shape}: met in {touched} steps");
     }
 }

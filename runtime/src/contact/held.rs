@@ -5,7 +5,7 @@
 //! slides against kinetic friction, and one that friction would push along sticks. Where that settles, the step ends on
 //! obstacles, obeys the cone, and pulls nowhere.
 
-use super::rule::{Move, Passage, meets};
+use super::rule::{Move, Passage, at_end, meets};
 use super::{Contact, Obstacle};
 
 /// Solutions of one step, at most.
@@ -86,7 +86,7 @@ impl Holding {
         let before = std::mem::take(&mut self.held);
         for old in before.into_iter().filter(|h| h.index < contact.nodes.len() && h.obstacle < passages.len()) {
             let from = contact.place(old.index, u);
-            let seen = contact.obstacles[old.obstacle].shape.nearest::<f64>(passages[old.obstacle].local(from));
+            let seen = contact.obstacles[old.obstacle].shape.nearest(passages[old.obstacle].local(from));
             // Nodes that slide on a curved surface leave it by a part of their way.
             if seen.distance <= 16.0 * tolerance {
                 let still = Move { from, by: [0.0; 3] };
@@ -174,14 +174,13 @@ fn hold(
 ) -> Option<Held> {
     let (passage, Obstacle { shape, sticking, .. }) = (&passages[obstacle], &contact.obstacles[obstacle]);
     let seen = passage.seen(node);
-    let (t, near) = meets(|x| shape.nearest(x), seen, tolerance);
-    let rest = (1.0 - t) * dot(near.normal, seen.by);
+    let (t, near) = meets(|x| shape.nearest(x), shape.approach(), seen, tolerance);
     // Where the path ends on the obstacle nothing is undone, and where it ends outside nothing was met.
     let is_still = node.by == [0.0; 3];
-    if !is_still && (near.distance > tolerance || near.distance + rest >= -tolerance) {
+    if !is_still && at_end(near, seen.by, t).distance >= -tolerance {
         return None;
     }
-    let surface: [f64; 3] = std::array::from_fn(|i| t * seen.by[i] - near.distance.min(0.0) * near.normal[i]);
+    let surface: [f64; 3] = std::array::from_fn(|i| t * seen.by[i] - near.distance * near.normal[i]);
     let mut normal = passage.outside(near.normal);
     let free = contact.free[index];
     (0..3).filter(|i| !free[*i]).for_each(|i| normal[i] = 0.0);

@@ -3,22 +3,28 @@
 //! | file | what |
 //! |---|---|
 //! | `shape` | an obstacle's surface, seen from a point |
+//! | `solid` | that of a surface of triangles |
+//! | `grid` | the same, tabulated |
 //! | `pose` | where it is over time |
 //! | `rule` | what meeting it does to a node in a step |
 //! | `held` | which nodes an implicit step holds on obstacles |
 //!
-//! All three are independent of devices: a backend runs the rule over the nodes of the surface. Coordinates are relative to
+//! All are independent of devices: a backend runs the rule over the nodes of the surface. Coordinates are relative to
 //! the middle of the body at rest, so that their roundings are those of its size.
 
+mod grid;
 mod held;
 mod pose;
 mod rule;
 mod shape;
+mod solid;
 
+pub use grid::Grid;
 pub use held::{ATTEMPTS, Attempt, Held, Holding};
 pub use pose::{Pose, RigidMotion, Turn, facing};
-pub use rule::{Move, NUMBERS, Passage, Response, Surface, respond};
-pub use shape::{Nearest, Shape};
+pub use rule::{Move, NUMBERS, Passage, Response, Surface, at_end, further, meets, respond, seen_before};
+pub use shape::{Approach, Convex, Nearest, Shape};
+pub use solid::Solid;
 
 use crate::body::Constraint;
 
@@ -81,12 +87,23 @@ impl Contact {
         }
         let length = |x: &[f64; 3]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
         let body = positions.iter().map(length).fold(0.0, f64::max);
-        let farthest = |o: &Obstacle| match o.shape {
-            Shape::Plane => (o.rest.rotation.inverse() * o.rest.origin.coords).z.abs(),
+        let farthest = |o: &Obstacle| match &o.shape {
+            Shape::Convex(Convex::Plane) => (o.rest.rotation.inverse() * o.rest.origin.coords).z.abs(),
             shape => o.rest.origin.coords.norm() + shape.reach(),
         };
         let size = obstacles.iter().map(farthest).fold(body, f64::max);
         Self { nodes: numbers, positions, free, obstacles, size }
+    }
+
+    /// Whether no obstacle is a surface of triangles.
+    pub fn is_tabulated(&self) -> bool {
+        self.obstacles.iter().all(|o| o.shape.solid().is_none())
+    }
+
+    /// The same with distances on grids in place of surfaces of triangles.
+    pub fn baked(&self) -> Self {
+        let bake = |o: &Obstacle| Obstacle { shape: o.shape.baked(), ..o.clone() };
+        Self { obstacles: self.obstacles.iter().map(bake).collect(), ..self.clone() }
     }
 
     /// How the obstacles move between two times.

@@ -9,12 +9,22 @@
 //! bounces does so by its elasticity.
 
 use super::pose::Pose;
-use super::shape::Nearest;
+use super::shape::{Approach, Nearest};
 use crate::backend::Scalar;
 
-/// Newton's steps to where a path enters an obstacle. The distance along a path is convex: they come from outside, one is
-/// enough for a plane, and on curved surfaces each doubles the digits. What is still left after the last counts as gap.
-const STEPS: usize = 8;
+impl Approach {
+    /// Steps along a path to where it enters an obstacle, at most. What is still left after the last counts as gap.
+    pub fn steps(self) -> usize {
+        match self {
+            // Newton's. The distance along a path is convex: they come from outside, one is enough for a plane, and on curved
+            // surfaces each doubles the digits.
+            Self::Tangents => 8,
+            // By the distance (sphere tracing, Hart 1996): they pass through nothing, and come the faster the straighter the path
+            // meets the surface.
+            Self::Distances => 64,
+        }
+    }
+}
 
 /// A node's move, in the obstacle's frame.
 #[derive(Debug, Clone, Copy)]
@@ -128,27 +138,60 @@ fn transposed<S: Scalar>(m: &[[S; 3]; 3], x: [S; 3]) -> [S; 3] {
     std::array::from_fn(|j| m[0][j] * x[0] + m[1][j] * x[1] + m[2][j] * x[2])
 }
 
-/// The part of a move after which it meets an obstacle, and what is seen from there: the end, where it does not.
-pub fn meets<S: Scalar>(nearest: impl Fn([S; 3]) -> Nearest<S>, node: Move<S>, tolerance: S) -> (S, Nearest<S>) {
-    let [zero, one] = [0.0, 1.0].map(S::number);
-    let Move { from, by } = node;
-    let at = |t: S| nearest(std::array::from_fn(|i| from[i] + t * by[i]));
-    let (mut t, mut seen) = (zero, nearest(from));
-    for _ in 0..STEPS {
-        // Where the tangent plane is met; never where the node moves away from it.
-        let closing = zero - dot(seen.normal, by);
-        let further = seen.distance / S::select_greater(closing, zero, closing, one);
-        let next = S::select_greater(closing, zero, (t + further).min(one), one);
-        t = S::select_greater(seen.distance, tolerance, next, t);
+/// The part of a move after which it meets an obstacle, and the surface seen from there: of what is met, its tangent plane; the
+/// end's, where nothing is met. `nearest` sees the obstacle from a point.
+pub fn meets(
+    nearest: impl Fn([f64; 3]) -> Nearest<f64>,
+    approach: Approach,
+    Move { from, by }: Move<f64>,
+    tolerance: f64,
+) -> (f64, Nearest<f64>) {
+    let at = |t: f64| nearest(std::array::from_fn(|i| from[i] + t * by[i]));
+    let (mut t, mut seen) = (0.0, nearest(from));
+    for _ in 0..approach.steps() {
+        if seen.distance <= tolerance || t >= 1.0 {
+            break;
+        }
+        t = further(approach, seen, by, t);
         seen = at(t);
+    }
+    // What slides along one side of a hollow may run into the next.
+    if approach == Approach::Distances && at_end(seen, by, t).distance >= 0.0 {
+        let end = at(1.0);
+        if end.distance < -tolerance {
+            seen = seen_before(end, by, t);
+        }
     }
     (t, seen)
 }
 
-/// The response to a move, where `nearest` sees the obstacle from a point.
-pub fn respond<S: Scalar>(nearest: impl Fn([S; 3]) -> Nearest<S>, node: Move<S>, surface: Surface<S>) -> Response<S> {
+/// How far to go on a path that has come as far as t, where it sees this.
+pub fn further<S: Scalar>(approach: Approach, seen: Nearest<S>, by: [S; 3], t: S) -> S {
     let [zero, one] = [0.0, 1.0].map(S::number);
-    let (t, seen) = meets(nearest, node, surface.tolerance);
+    let closing = match approach {
+        // To where the tangent plane is met; never where the node moves away from it.
+        Approach::Tangents => zero - dot(seen.normal, by),
+        Approach::Distances => dot(by, by).sqrt(),
+    };
+    let further = seen.distance / S::select_greater(closing, zero, closing, one);
+    S::select_greater(closing, zero, (t + further).min(one), one)
+}
+
+/// The plane that is seen at a part of a path, as it is seen from its end.
+pub fn at_end<S: Scalar>(seen: Nearest<S>, by: [S; 3], t: S) -> Nearest<S> {
+    let rest = (S::number(1.0) - t) * dot(seen.normal, by);
+    Nearest { distance: seen.distance + rest, ..seen }
+}
+
+/// The plane that is seen at the end of a path, as it is seen from a part of it.
+pub fn seen_before<S: Scalar>(end: Nearest<S>, by: [S; 3], t: S) -> Nearest<S> {
+    let rest = (S::number(1.0) - t) * dot(end.normal, by);
+    Nearest { distance: end.distance - rest, ..end }
+}
+
+/// The response to a move that meets a surface after a part of it: see [`meets`].
+pub fn respond<S: Scalar>((t, seen): (S, Nearest<S>), node: Move<S>, surface: Surface<S>) -> Response<S> {
+    let [zero, one] = [0.0, 1.0].map(S::number);
     let by = node.by;
     let gap = S::select_greater(seen.distance, surface.tolerance, seen.distance, zero);
     let rest = by.map(|d| (one - t) * d);

@@ -1,13 +1,28 @@
 //! Shapes of obstacles, each in a frame of its own: the distance of a point, and the direction in which it grows.
 //!
-//! Distances are Euclidean and signed, negative inside; those of the shapes here are convex functions of the point. They are
-//! written once over [`Scalar`]: a CPU runs them, a GPU gets their trace.
+//! Distances are Euclidean and signed, negative inside. Those of convex shapes are convex functions of the point, written once
+//! over [`Scalar`]: a CPU runs them, a GPU gets their trace.
 
+use std::sync::Arc;
+
+use super::grid::Grid;
+use super::solid::Solid;
 use crate::backend::Scalar;
 
-/// A convex shape around the origin; lengths in m, or in whatever unit points have.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A shape; lengths in m, or in whatever unit points have.
+#[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
+    /// A convex one in closed form.
+    Convex(Convex),
+    /// What a surface of triangles encloses.
+    Solid(Arc<Solid>),
+    /// The same by its distances on a grid.
+    Grid(Arc<Grid>),
+}
+
+/// A convex shape around the origin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Convex {
     /// The half-space z <= 0.
     Plane,
     /// What is no farther than `radius` from the points of the z axis with |z| <= `half`; a sphere where `half` is 0.
@@ -31,6 +46,15 @@ pub enum Shape {
     },
 }
 
+/// How a path is followed to a surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Approach {
+    /// From tangent plane to tangent plane: what is convex lies behind each of them.
+    Tangents,
+    /// By the distance at a time: nothing is nearer.
+    Distances,
+}
+
 /// Where a shape's surface is, seen from a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nearest<S> {
@@ -41,6 +65,59 @@ pub struct Nearest<S> {
 }
 
 impl Shape {
+    /// The shape's surface seen from a point. Where several directions are equally right it is one of them.
+    pub fn nearest(&self, point: [f64; 3]) -> Nearest<f64> {
+        match self {
+            Self::Convex(shape) => shape.nearest(point),
+            Self::Solid(solid) => solid.nearest(point),
+            Self::Grid(grid) => grid.nearest(point),
+        }
+    }
+
+    /// How its surface is approached.
+    pub fn approach(&self) -> Approach {
+        match self {
+            Self::Convex(_) => Approach::Tangents,
+            Self::Solid(_) | Self::Grid(_) => Approach::Distances,
+        }
+    }
+
+    /// How far from its origin a point of its surface may be.
+    pub fn reach(&self) -> f64 {
+        match self {
+            Self::Convex(shape) => shape.reach(),
+            Self::Solid(solid) => solid.reach(),
+            Self::Grid(grid) => grid.reach(),
+        }
+    }
+
+    /// What a surface of triangles encloses.
+    pub fn solid(&self) -> Option<&Solid> {
+        match self {
+            Self::Solid(solid) => Some(solid),
+            Self::Convex(_) | Self::Grid(_) => None,
+        }
+    }
+
+    /// Bytes of what it looks up.
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::Convex(_) => 0,
+            Self::Solid(solid) => solid.bytes(),
+            Self::Grid(grid) => size_of_val(grid.values()),
+        }
+    }
+
+    /// The same with distances on a grid in place of triangles.
+    pub fn baked(&self) -> Self {
+        match self {
+            Self::Solid(solid) => Self::Grid(Arc::new(Grid::bake(solid))),
+            Self::Convex(_) | Self::Grid(_) => self.clone(),
+        }
+    }
+}
+
+impl Convex {
     /// The shape's surface seen from a point. Where several directions are equally right it is one of them.
     pub fn nearest<S: Scalar>(self, [x, y, z]: [S; 3]) -> Nearest<S> {
         let [zero, one] = [0.0, 1.0].map(S::number);
@@ -76,8 +153,7 @@ impl Shape {
         }
     }
 
-    /// How far from its origin a point of its surface may be.
-    pub fn reach(self) -> f64 {
+    fn reach(self) -> f64 {
         match self {
             Self::Plane => 0.0,
             Self::Capsule { half, radius } => half + radius,

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::Precision;
 use super::vectors::{BLOCK, CpuVector};
 use crate::backend::Meeting;
-use crate::contact::{Contact, Move, Obstacle, Passage, SWEEPS, Surface, respond};
+use crate::contact::{Approach, Contact, Move, Obstacle, Passage, SWEEPS, Surface, meets, respond};
 use crate::cpu::CpuBackend;
 
 /// A node that may touch something.
@@ -26,6 +26,8 @@ pub struct CpuContact {
     /// By places, ascending.
     nodes: Vec<Touching>,
     obstacles: Vec<Obstacle>,
+    /// What one convex obstacle does brings nobody into it.
+    is_one_sweep_enough: bool,
     tolerance: f64,
 }
 
@@ -41,7 +43,13 @@ impl CpuContact {
             })
             .collect();
         nodes.sort_unstable_by_key(|n| n.place);
-        Self { nodes, obstacles: contact.obstacles.clone(), tolerance: contact.tolerance(epsilon) }
+        let obstacles = contact.obstacles.clone();
+        Self {
+            nodes,
+            is_one_sweep_enough: matches!(&obstacles[..], [one] if one.shape.approach() == Approach::Tangents),
+            obstacles,
+            tolerance: contact.tolerance(epsilon),
+        }
     }
 
     /// The nodes of a block.
@@ -63,8 +71,9 @@ impl CpuContact {
                 if nearest(seen.from).distance > travel + self.tolerance {
                     continue;
                 }
-                let Obstacle { sticking, sliding, .. } = *obstacle;
-                let response = respond(nearest, seen, Surface { sticking, sliding, tolerance: self.tolerance });
+                let Obstacle { sticking, sliding, .. } = obstacle.clone();
+                let surface = Surface { sticking, sliding, tolerance: self.tolerance };
+                let response = respond(meets(nearest, obstacle.shape.approach(), seen, self.tolerance), seen, surface);
                 let [kick, push] = [response.change, response.push].map(|x| passage.outside(x));
                 for i in (0..3).filter(|i| free[*i]) {
                     by[i] += kick[i] + push[i];
@@ -72,7 +81,7 @@ impl CpuContact {
                     met |= kick[i] + push[i] != 0.0;
                 }
             }
-            if !met || self.obstacles.len() == 1 {
+            if !met || self.is_one_sweep_enough {
                 break;
             }
         }

@@ -1,6 +1,8 @@
 //! A law on one element, in double precision: what step limits and tests ask of it.
 
-use tensormass_kernels::{Blocks, Cluster, Compute, ElementEntry, Engine, Extent, LawEntry, Node, RestPoint, compose};
+use tensormass_kernels::{
+    Blocks, Cluster, Compute, ElementEntry, Engine, Extent, LawEntry, Node, RestPoint, compose, linear_tetrahedron,
+};
 
 /// One element with its kernels; vectors are given at its nodes.
 pub struct One {
@@ -10,6 +12,12 @@ pub struct One {
 
 fn padded(u: &[[f64; 3]]) -> Vec<Node<f64>> {
     u.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect()
+}
+
+impl std::fmt::Debug for One {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("One").finish_non_exhaustive()
+    }
 }
 
 impl One {
@@ -24,6 +32,25 @@ impl One {
         let mut blocks = Blocks::new(compute.lanes(), shape, false, &[Extent::of(1)]);
         blocks.fill(0, &Cluster { nodes: &nodes, rest, constants });
         Self { blocks, compute }
+    }
+
+    /// A law alone, at a point where the displacement gradient is given.
+    ///
+    /// # Panics
+    /// The constants are not those of the law.
+    pub fn point(law: &LawEntry, constants: &[f64]) -> Self {
+        let rest = RestPoint { inverse_jacobian: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], weight: 1.0 };
+        Self::new(linear_tetrahedron(), law, &[rest], constants)
+    }
+
+    /// The Cauchy stress, row by row, of a [`One::point`] with this displacement gradient.
+    pub fn cauchy(&self, g: &[f64; 9]) -> [f64; 9] {
+        // The gradients of the functions of the last three nodes are the unit vectors.
+        let mut u = [[0.0; 3]; 4];
+        (0..9).for_each(|k| u[1 + k % 3][k / 3] = g[k]);
+        let mut stress = [[0.0; 9]];
+        self.compute.cauchy(self.blocks.part(0), &padded(&u), &mut stress);
+        stress[0]
     }
 
     /// What is added to zeros at the nodes.

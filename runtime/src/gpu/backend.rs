@@ -483,6 +483,10 @@ impl Backend for GpuBackend {
         faces.add(self, pressure, u, f);
     }
 
+    fn contact_here(&self, contact: Arc<Contact>) -> Arc<Contact> {
+        if contact.is_tabulated() { contact } else { Arc::new(contact.baked()) }
+    }
+
     fn contact(&self, contact: &Contact) -> GpuContact {
         GpuContact::new(self, contact)
     }

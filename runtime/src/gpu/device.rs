@@ -102,6 +102,11 @@ impl Gpu {
         }
     }
 
+    /// Says that something went wrong where no error can be returned.
+    pub(super) fn fail(&self, error: DeviceError) {
+        self.faults.record(error);
+    }
+
     /// Waits until everything submitted is done and its callbacks have been called.
     ///
     /// # Errors

@@ -156,6 +156,14 @@ impl Recorder {
         Ok(memory)
     }
 
+    /// As [`Recorder::filled`]; a buffer of nothing where the device cannot bind as much, which it says when it is checked.
+    pub(super) fn filled_or_failed<T: bytemuck::Pod>(&self, what: &str, content: &[T]) -> Memory {
+        self.filled(what, content).unwrap_or_else(|error| {
+            self.gpu.fail(error);
+            self.memory(what, 0).expect("16 bytes")
+        })
+    }
+
     /// Writes a buffer, after everything that was recorded until now.
     pub(super) fn write<T: bytemuck::Pod>(&self, memory: &Memory, content: &[T]) {
         self.submit();

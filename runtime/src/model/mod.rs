@@ -122,7 +122,7 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
     let pressures = loads::pressures(scene, &mesh, &places, &scale)?;
     warnings.extend(units::warnings(scene, &mesh, assignment.stiffness(), assignment.density()));
     let contact = obstacle::contact(scene, &mesh, &constraints, &scale)?;
-    let recorder = Recorder::new(scene, &mesh, &places, &constraints)?;
+    let recorder = Recorder::new(scene, &mesh, &places, &constraints, &batches, &scale)?;
     let velocity = scene.initial.velocity.map(|v| v / scale.velocity());
     let body = Body {
         elements,

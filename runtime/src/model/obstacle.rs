@@ -1,11 +1,14 @@
 //! Obstacles of a scene, in scaled units around the middle of the body, and the nodes that may touch them.
 
+use std::sync::Arc;
+
 use nalgebra::{Point3, Rotation3, Unit, Vector3};
+use rayon::prelude::*;
 
 use crate::body::Constraint;
-use crate::contact::{Contact, Obstacle, Pose, RigidMotion, Shape, Turn, facing};
+use crate::contact::{Contact, Convex, Obstacle, Pose, RigidMotion, Shape, Solid, Turn, facing};
 use crate::history::History;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, surface};
 use crate::scale::Scale;
 use crate::scene::{self, Scene, SceneError};
 
@@ -62,16 +65,28 @@ impl Placing<'_> {
         let (shape, rotation, origin) = self.shape(&given.shape, i)?;
         let rest = Pose { rotation, origin: self.scaled(origin) };
         let [sticking, sliding] = given.friction.coefficients();
-        Ok(Obstacle {
-            shape: shape.scaled(1.0 / self.scale.length),
-            rest,
-            motion: self.motion(given, i)?,
-            sticking,
-            sliding,
-        })
+        Ok(Obstacle { shape, rest, motion: self.motion(given, i)?, sticking, sliding })
     }
 
-    /// The shape in m, and where it is.
+    /// What a surface encloses, in scaled units around the middle of its extent, and where that is.
+    fn solid(&self, given: &scene::Surface, i: usize) -> Result<(Shape, Rotation3<f64>, Point3<f64>), SceneError> {
+        let at = || self.scene.locate(&format!("obstacle.{i}.shape.mesh.file"));
+        let read =
+            surface::read(&self.scene.resolve(&given.file)).map_err(|e| SceneError::at(at(), e.reason, e.remedy))?;
+        let (low, high) = read.vertices.iter().fold(([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]), |(low, high), x| {
+            (std::array::from_fn(|c| low[c].min(x[c])), std::array::from_fn(|c| high[c].max(x[c])))
+        });
+        let middle: [f64; 3] = std::array::from_fn(|c| 0.5 * (low[c] + high[c]));
+        let factor = given.scale / self.scale.length;
+        let vertices = read.vertices.iter().map(|x| std::array::from_fn(|c| (x[c] - middle[c]) * factor));
+        let solid = Solid::new(vertices, read.triangles, given.cells)
+            .map_err(|e| SceneError::at(at(), e.to_string(), "repair the surface, or use a shape such as a box"))?;
+        let rotation = Rotation3::from_scaled_axis(Vector3::from(given.rotation));
+        let origin = Point3::from(given.translation) + rotation * (Vector3::from(middle) * given.scale);
+        Ok((Shape::Solid(Arc::new(solid)), rotation, origin))
+    }
+
+    /// The shape in scaled units, and where it is in m.
     fn shape(&self, shape: &scene::Shape, i: usize) -> Result<(Shape, Rotation3<f64>, Point3<f64>), SceneError> {
         let rod = |rod: &scene::Rod, name: &str| {
             let (from, to) = (Point3::from(rod.from), Point3::from(rod.to));
@@ -79,27 +94,31 @@ impl Placing<'_> {
                 self.direction(to - from, &format!("obstacle.{i}.shape.{name}.to"), "is where the axis begins")?;
             Ok((0.5 * (to - from).norm(), facing(axis), nalgebra::center(&from, &to)))
         };
+        let convex = |shape: Convex| Shape::Convex(shape.scaled(1.0 / self.scale.length));
         match shape {
             scene::Shape::Plane { point, normal } => {
                 let path = format!("obstacle.{i}.shape.plane.normal");
                 let normal = self.direction(Vector3::from(*normal), &path, "has no direction")?;
-                Ok((Shape::Plane, facing(normal), Point3::from(*point)))
+                Ok((convex(Convex::Plane), facing(normal), Point3::from(*point)))
             }
             scene::Shape::Box { centre, size, rotation } => {
                 let turned = Rotation3::from_scaled_axis(Vector3::from(*rotation));
-                Ok((Shape::Box { half: size.map(|x| 0.5 * x) }, turned, Point3::from(*centre)))
+                Ok((convex(Convex::Box { half: size.map(|x| 0.5 * x) }), turned, Point3::from(*centre)))
             }
-            scene::Shape::Sphere { centre, radius } => {
-                Ok((Shape::Capsule { half: 0.0, radius: *radius }, Rotation3::identity(), Point3::from(*centre)))
-            }
+            scene::Shape::Sphere { centre, radius } => Ok((
+                convex(Convex::Capsule { half: 0.0, radius: *radius }),
+                Rotation3::identity(),
+                Point3::from(*centre),
+            )),
             scene::Shape::Capsule(given) => {
                 let (half, rotation, middle) = rod(given, "capsule")?;
-                Ok((Shape::Capsule { half, radius: given.radius }, rotation, middle))
+                Ok((convex(Convex::Capsule { half, radius: given.radius }), rotation, middle))
             }
             scene::Shape::Cylinder(given) => {
                 let (half, rotation, middle) = rod(given, "cylinder")?;
-                Ok((Shape::Cylinder { half, radius: given.radius }, rotation, middle))
+                Ok((convex(Convex::Cylinder { half, radius: given.radius }), rotation, middle))
             }
+            scene::Shape::Mesh(given) => self.solid(given, i),
         }
     }
 
@@ -146,7 +165,7 @@ fn starts_outside(
     };
     let distance = |position: &[f64; 3]| {
         let local = pose.rotation.inverse() * (Point3::from(*position) - pose.origin);
-        obstacle.shape.nearest::<f64>(local.into()).distance
+        obstacle.shape.nearest(local.into()).distance
     };
     let deepest = contact.positions.iter().map(distance).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((k, depth)) = deepest.filter(|(_, distance)| *distance < -ROUNDED * contact.size) {
@@ -168,10 +187,21 @@ fn starts_outside(
             ));
         }
     }
-    let origin = place.in_metres(pose.origin);
-    if obstacle.shape != Shape::Plane && mesh.encloses(origin.into()) {
-        let [x, y, z] = origin.coords.into();
-        return refused(format!("`obstacle.{i}` is inside the body at the start: its middle is at ({x}, {y}, {z})"));
+    let [low, high] = mesh.bounding_box();
+    let is_inside =
+        |point: &Point3<f64>| (0..3).all(|c| low[c] < point[c] && point[c] < high[c]) && mesh.encloses((*point).into());
+    let of = |local: [f64; 3]| place.in_metres(pose.rotation * Point3::from(local) + pose.origin.coords);
+    let (what, inside) = match &obstacle.shape {
+        Shape::Convex(Convex::Plane) => return Ok(()),
+        Shape::Convex(_) | Shape::Grid(_) => ("its middle", Some(place.in_metres(pose.origin)).filter(is_inside)),
+        Shape::Solid(solid) => {
+            let vertices: Vec<Point3<f64>> = solid.vertices().map(of).collect();
+            ("a vertex of it", vertices.into_par_iter().find_first(is_inside))
+        }
+    };
+    if let Some(point) = inside {
+        let [x, y, z] = point.coords.into();
+        return refused(format!("`obstacle.{i}` is inside the body at the start: {what} is at ({x}, {y}, {z})"));
     }
     Ok(())
 }

@@ -31,8 +31,8 @@ pub fn warnings(scene: &Scene, mesh: &Mesh, stiffness: f64, density: f64) -> Vec
     }
     for (i, obstacle) in scene.obstacle.iter().enumerate() {
         let (size, far) = match &obstacle.shape {
-            // A half-space is large, and its point may be anywhere.
-            Shape::Plane { .. } => continue,
+            // A half-space is large, and its point may be anywhere. The size of a surface is its file's.
+            Shape::Plane { .. } | Shape::Mesh(_) => continue,
             Shape::Box { centre, size, .. } => (Vector3::from(*size).norm(), *centre),
             Shape::Sphere { centre, radius } => (2.0 * radius, *centre),
             Shape::Capsule(rod) | Shape::Cylinder(rod) => {

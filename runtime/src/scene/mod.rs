@@ -29,7 +29,7 @@ pub use model::{
     About, Axis, Beam, Boundary, History, Initial, Load, Material, Mesh, Motion, Parameter, ParameterValue, PerElement,
     Ramp, SceneData, Torus,
 };
-pub use obstacle::{Angle, Friction, Obstacle, Rod, Rotate, Shape};
+pub use obstacle::{Angle, Friction, Obstacle, Rod, Rotate, Shape, Surface};
 pub use output::{Component, EnergyPart, Field, Output, Probe, Statistic, StressComponent};
 pub use overrides::Override;
 pub use predicate::{ExpressionError, Predicate};

@@ -3,6 +3,7 @@
 use super::model::{History, Motion, Ramp};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 
 /// Something that does not deform, and that the body's surface cannot enter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -64,6 +65,41 @@ pub enum Shape {
     Capsule(Rod),
     /// A straight cylinder with flat ends.
     Cylinder(Rod),
+    /// What a closed surface of triangles encloses; its triangles turn counterclockwise seen from outside.
+    Mesh(Surface),
+}
+
+/// A surface of triangles from a file, scaled, turned, then moved.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Surface {
+    /// Path of an STL or OBJ file, relative to the scene file.
+    #[schemars(length(min = 1))]
+    pub file: PathBuf,
+    /// Length of the file's unit in m (0.001 for a surface in mm), from 1e-9 to 1e9.
+    #[serde(default = "one")]
+    #[schemars(range(min = 1e-9, max = 1e9))]
+    pub scale: f64,
+    /// A rotation about the file's origin: a vector along the axis, as long as the angle in rad; each component within +-1e3.
+    #[serde(default)]
+    #[schemars(inner(range(min = -1e3, max = 1e3)))]
+    pub rotation: [f64; 3],
+    /// Where that takes the file's origin, in m; each component within +-1e6.
+    #[serde(default)]
+    #[schemars(inner(range(min = -1e6, max = 1e6)))]
+    pub translation: [f64; 3],
+    /// Cells along its longest side of the grid of distances that a GPU reads, from 8 to 256: finer is more accurate.
+    #[serde(default = "cells")]
+    #[schemars(range(min = 8, max = 256))]
+    pub cells: u32,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn cells() -> u32 {
+    64
 }
 
 /// A segment and a radius.

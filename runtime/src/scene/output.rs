@@ -86,6 +86,17 @@ pub enum Probe {
         #[serde(default)]
         statistic: Statistic,
     },
+    /// Cauchy stress at a point of the body, which moves with it, in Pa.
+    PointStress {
+        /// The probe's name in the results; unique.
+        #[schemars(length(min = 1))]
+        name: String,
+        /// Where the point is at rest, m; in plane bodies z does not matter.
+        #[schemars(inner(range(min = -1e6, max = 1e6)))]
+        point: [f64; 3],
+        /// The component, or an invariant.
+        component: StressComponent,
+    },
 }
 
 impl Probe {
@@ -98,7 +109,8 @@ impl Probe {
             | Self::ApparentYoungModulus { name, .. }
             | Self::Energy { name, .. }
             | Self::Volume { name, .. }
-            | Self::Stress { name, .. } => name,
+            | Self::Stress { name, .. }
+            | Self::PointStress { name, .. } => name,
         }
     }
 
@@ -107,7 +119,7 @@ impl Probe {
         match self {
             Self::Displacement { .. } => "m",
             Self::Reaction { .. } | Self::ContactForce { .. } => "N",
-            Self::ApparentYoungModulus { .. } | Self::Stress { .. } => "Pa",
+            Self::ApparentYoungModulus { .. } | Self::Stress { .. } | Self::PointStress { .. } => "Pa",
             Self::Energy { .. } => "J",
             Self::Volume { .. } => "m3",
         }

@@ -212,7 +212,7 @@ fn scene_sum(scene: &Scene) -> u32 {
     checksum(data.to_string().as_bytes())
 }
 
-/// Of the mesh and the constants of its materials.
+/// Of the mesh, the constants of its materials, and obstacles from files.
 fn body_sum(model: &Model) -> u32 {
     let mut bytes: Vec<u8> = vec![];
     bytes.extend(model.mesh.nodes().iter().flatten().flat_map(|x| x.to_bits().to_le_bytes()));
@@ -220,6 +220,11 @@ fn body_sum(model: &Model) -> u32 {
     for batch in &model.body.batches {
         bytes.extend(batch.constants.iter().flat_map(|x| x.to_bits().to_le_bytes()));
         bytes.extend(batch.elements.iter().flat_map(|e| e.to_le_bytes()));
+    }
+    for obstacle in model.body.contact.iter().flat_map(|contact| &contact.obstacles) {
+        if let Some(solid) = obstacle.shape.solid() {
+            bytes.extend(solid.vertices().flatten().flat_map(|x| x.to_bits().to_le_bytes()));
+        }
     }
     checksum(&bytes)
 }

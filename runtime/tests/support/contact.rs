@@ -1,6 +1,8 @@
 //! Bodies that fall on obstacles, taken step by step on any backend.
 #![allow(dead_code)] // every test links its own copy and uses a part of it
 
+use std::sync::Arc;
+
 use tensormass_runtime::backend::{Backend, ForceField};
 use tensormass_runtime::body::Body;
 use tensormass_runtime::cg::CgLimits;
@@ -41,6 +43,15 @@ pub const BELOW: [&str; 5] = [
     "{ cylinder = { from = [0.002, 0, -0.022], to = [0.002, 0, -0.002], radius = 0.009 } }",
 ];
 
+/// Surfaces of triangles: the box of [`BELOW`], and a sphere that is 2 mm below the cube.
+pub const MESHES: [&str; 2] = [
+    "{ mesh = { file = \"tests/data/box.stl\", scale = 0.001, translation = [0.004, 0.003, -0.01] } }",
+    "{ mesh = { file = \"tests/data/ball.obj\", scale = 0.03, rotation = [0.3, 0, 0.2], translation = [0.001, 0, -0.032] } }",
+];
+
+/// A dish whose hollow is turned against the cube that falls into it, and meets its brim.
+pub const DISH: &str = "{ mesh = { file = \"tests/data/dish.obj\", scale = 0.0006, rotation = [0.3, 0.2, 0.7], translation = [0.004, 0, -0.008] } }";
+
 /// A model on a backend, with its time step.
 pub struct Bench<B: Backend, F: ForceField<B>> {
     pub system: System<B, F>,
@@ -57,11 +68,20 @@ pub type OnCpu<R> = Bench<CpuBackend<R>, CpuField<R>>;
 
 /// See [`Bench::new`].
 pub fn on_cpu<R: Precision>(scene: &Scene) -> OnCpu<R> {
-    Bench::new(scene, |body| {
-        let backend = CpuBackend::new(body);
-        let field = CpuField::new(&backend, body);
-        (backend, field)
-    })
+    Bench::new(scene, cpu)
+}
+
+fn cpu<R: Precision>(body: &Body) -> (CpuBackend<R>, CpuField<R>) {
+    let backend = CpuBackend::new(body);
+    let field = CpuField::new(&backend, body);
+    (backend, field)
+}
+
+/// One on the CPU whose surfaces of triangles are grids, as a device has them.
+pub fn tabulated<R: Precision>(scene: &Scene) -> OnCpu<R> {
+    let mut model = build(scene).unwrap_or_else(|e| panic!("{e}"));
+    model.body.contact = model.body.contact.map(|contact| Arc::new(contact.baked()));
+    Bench::of(model, scene, cpu)
 }
 
 /// One on the CPU that takes implicit steps, whatever the scene says.
@@ -79,7 +99,12 @@ pub fn implicit(scene: &Scene) -> OnCpu<f64> {
 impl<B: Backend + 'static, F: ForceField<B> + 'static> Bench<B, F> {
     /// A scene with an obstacle at its beginning.
     pub fn new(scene: &Scene, on: impl FnOnce(&Body) -> (B, F)) -> Self {
-        let Model { body, scale, velocity, .. } = build(scene).unwrap_or_else(|e| panic!("{e}"));
+        Self::of(build(scene).unwrap_or_else(|e| panic!("{e}")), scene, on)
+    }
+
+    /// As [`Bench::new`], of the scene's model.
+    pub fn of(model: Model, scene: &Scene, on: impl FnOnce(&Body) -> (B, F)) -> Self {
+        let Model { body, scale, velocity, .. } = model;
         let (backend, field) = on(&body);
         let size = body.contact.as_ref().expect("an obstacle").size;
         let system = System::new(backend, field, body);
