@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use tensormass_kernels::{ElementEntry, ElementInfo};
 
 use crate::backend::Backend;
+use crate::body::Body;
 use crate::mesh::{Incidence, Mesh, NodeId, point_volumes};
 
 /// Elements whose matrices are computed at once.
@@ -124,6 +125,16 @@ impl MassMatrix {
         self.len() == 0
     }
 
+    /// The matrix with numbers added to the diagonal at some nodes.
+    pub fn with_added(mut self, added: &[(u32, f64)]) -> Self {
+        for (node, value) in added {
+            let row = self.row(*node as usize);
+            let place = self.columns[row.clone()].binary_search(node).expect("a node is a neighbour of itself");
+            self.values[row.start + place] += value;
+        }
+        self
+    }
+
     /// The diagonal.
     pub fn diagonal(&self) -> Vec<f64> {
         let entry = |i: usize| {
@@ -189,6 +200,18 @@ impl<B: Backend> Masses<B> {
     pub fn consistent(backend: &B, matrix: &MassMatrix) -> Self {
         let diagonal: Vec<[f64; 3]> = matrix.diagonal().iter().map(|m| [*m; 3]).collect();
         Self { diagonal: backend.upload(&diagonal), matrix: Some(backend.matrix(matrix)) }
+    }
+
+    /// The masses of a body, with some added at nodes.
+    pub fn of(backend: &B, body: &Body, added: &[(u32, f64)]) -> Self {
+        if let Some(matrix) = &body.mass_matrix {
+            return Self::consistent(backend, &matrix.clone().with_added(added));
+        }
+        let mut masses: Vec<[f64; 3]> = body.masses.iter().map(|m| [*m; 3]).collect();
+        for (node, value) in added {
+            masses[*node as usize].iter_mut().for_each(|m| *m += value);
+        }
+        Self::lumped(backend.upload(&masses))
     }
 
     /// The diagonal of M: all of it where masses are lumped.

@@ -91,10 +91,7 @@ impl<B: Backend, F: ForceField<B>> System<B, F> {
     /// Puts a body on a backend.
     pub fn new(backend: B, field: F, mut body: Body) -> Self {
         body.contact = body.contact.map(|contact| backend.contact_here(contact));
-        let masses = match &body.mass_matrix {
-            Some(matrix) => Masses::consistent(&backend, matrix),
-            None => Masses::lumped(backend.upload(&body.masses.iter().map(|&m| [m; 3]).collect::<Vec<_>>())),
-        };
+        let masses = Masses::of(&backend, &body, &[]);
         let loads = body.loads.iter().map(|l| backend.upload(&l.forces)).collect();
         let touch = body.contact.as_ref().map(|contact| Touch {
             device: backend.contact(contact),

@@ -77,14 +77,17 @@ fn stresses_are_those_of_the_point() {
             "[[probe]]\nname = \"element\"\nkind = \"stress\"\nelements = {{ box = {{ min = [4.87, 0.74, 0.62], max = [4.88, 0.76, \
              0.63] }} }}\ncomponent = \"{component}\"\n"
         );
-        let scene = scene(&(text.clone() + &of_element + &point("point", at, component)), &["solver.precision=f64"]);
+        let scene = scene(
+            &[&text, &of_element, &point("point", at, component)].map(String::as_str).concat(),
+            &["solver.precision=f64"],
+        );
         let run = done(&scene);
         let [found, wanted] = ["point", "element"].map(|name| probe(&run, name));
         assert!((found - wanted).abs() <= 1e-9 * wanted.abs(), "{component}: {found:e} for {wanted:e}");
     }
     for (z, element) in [(0.9, "hexahedron_s2"), (0.1, "tetrahedron_p2"), (0.5, "hexahedron_s2")] {
         let set = [format!("mesh.beam.element={element}")];
-        let run = done(&scene(&(CANTILEVER.to_string() + &point("bent", [5.0, 0.5, z], "xx")), &set));
+        let run = done(&scene(&format!("{CANTILEVER}{}", point("bent", [5.0, 0.5, z], "xx")), &set));
         // A force of 1 N upwards at x = 10: compressed above.
         let (found, wanted) = (probe(&run, "bent"), -5.0 * (z - 0.5) * 12.0);
         assert!((found - wanted).abs() <= 0.01 * 30.0, "{element}, z {z}: {found:e} for {wanted:e}");

@@ -8,10 +8,12 @@
 //! | `pose` | where it is over time |
 //! | `rule` | what meeting it does to a node in a step |
 //! | `held` | which nodes an implicit step holds on obstacles |
+//! | `friction` | what friction does to them |
 //!
 //! All are independent of devices: a backend runs the rule over the nodes of the surface. Coordinates are relative to
 //! the middle of the body at rest, so that their roundings are those of its size.
 
+mod friction;
 mod grid;
 mod held;
 mod pose;
@@ -19,6 +21,7 @@ mod rule;
 mod shape;
 mod solid;
 
+pub use friction::Grip;
 pub use grid::Grid;
 pub use held::{ATTEMPTS, Attempt, Held, Holding};
 pub use pose::{Pose, RigidMotion, Turn, facing};

@@ -194,7 +194,7 @@ impl<R: Precision> Backend for CpuBackend<R> {
     }
 
     fn hold(&mut self, held: &[Held]) {
-        let place = |held: &Held| (self.places[held.node as usize] as usize, held.normal, held.sticks);
+        let place = |held: &Held| (self.places[held.node as usize] as usize, held.normal, held.grip.sticks);
         self.held = held.iter().map(place).collect();
     }
 

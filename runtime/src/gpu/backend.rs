@@ -380,7 +380,7 @@ impl Backend for GpuBackend {
 
     fn hold(&mut self, held: &[Held]) {
         let node = |held: &Held| {
-            let [x, y, z] = held.normal.map(|x| if held.sticks { 0 } else { (x as f32).to_bits() });
+            let [x, y, z] = held.normal.map(|x| if held.grip.sticks { 0 } else { (x as f32).to_bits() });
             [x, y, z, self.order.places[held.node as usize]]
         };
         let content: Vec<[u32; 4]> = held.iter().map(node).collect();

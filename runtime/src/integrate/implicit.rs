@@ -13,6 +13,7 @@ use serde_json::{Value, json};
 
 use crate::backend::{Backend, ForceField};
 use crate::contact::{ATTEMPTS, Attempt, Contact, Held, Holding};
+use crate::mass::Masses;
 use crate::system::{Integrator, SolveError, State, StepReport, System};
 
 use super::newton::{Equation, Newton, SolverSettings};
@@ -60,7 +61,8 @@ impl<B: Backend> ImplicitEuler<B> {
         system.backend.hold(held);
         let backend = &system.backend;
         backend.clear(&mut self.dv);
-        let has_constant = alpha != 0.0 || held.iter().any(|held| held.friction != [0.0; 3]);
+        let has_constant =
+            alpha != 0.0 || held.iter().any(|held| held.grip.friction != [0.0; 3] || held.grip.drag > 0.0);
         if has_constant {
             backend.clear(&mut self.constant);
         }
@@ -73,8 +75,13 @@ impl<B: Backend> ImplicitEuler<B> {
                 let node = held.node as usize;
                 let to: [f64; 3] = std::array::from_fn(|i| held.target[i] / h - v[node][i]);
                 let along: f64 = to.iter().zip(held.normal).map(|(x, n)| x * n).sum();
-                change[node] = if held.sticks { to } else { held.normal.map(|n| along * n) };
-                friction[node] = held.friction;
+                change[node] = if held.grip.sticks { to } else { held.normal.map(|n| along * n) };
+                friction[node] = held.grip.friction;
+                if held.grip.drag > 0.0 {
+                    // -drag (h (v + dv) - target) along the surface: the part of dv is a mass, which has no direction.
+                    let slip = held.slip(v[node].map(|v| h * v));
+                    friction[node] = std::array::from_fn(|i| held.grip.drag * (h * along * held.normal[i] - slip[i]));
+                }
             }
             backend.axpy(1.0, &backend.upload(&change), &mut self.dv);
             if has_constant {
@@ -94,9 +101,21 @@ impl<B: Backend> ImplicitEuler<B> {
             viscous: system.body.is_viscous(),
             stiffness_damping: system.body.stiffness_damping,
         };
-        let report = self.newton.solve(system, &equation, &mut self.dv, &self.settings)?;
-        let holding = if held.is_empty() { vec![] } else { self.newton.holding(system, &equation, &self.dv)? };
-        Ok((report, holding))
+        let drags: Vec<(u32, f64)> = held
+            .iter()
+            .filter(|held| held.grip.drag > 0.0)
+            .map(|held| (held.node, held.grip.drag * h / equation.mass))
+            .collect();
+        let masses = (!drags.is_empty()).then(|| Masses::of(&system.backend, &system.body, &drags));
+        let masses = masses.map(|masses| std::mem::replace(&mut system.masses, masses));
+        let solved = self.newton.solve(system, &equation, &mut self.dv, &self.settings).and_then(|report| {
+            let holding = if held.is_empty() { vec![] } else { self.newton.holding(system, &equation, &self.dv)? };
+            Ok((report, holding))
+        });
+        if let Some(masses) = masses {
+            system.masses = masses;
+        }
+        solved
     }
 
     /// Solves for dV with the nodes held that have to be.
@@ -125,7 +144,8 @@ impl<B: Backend> ImplicitEuler<B> {
                 let (node, free) = (held.node as usize, contact.free[held.index]);
                 // What supports hold is not the obstacle's.
                 (0..3).filter(|i| !free[*i]).for_each(|i| impulses[node][i] = 0.0);
-                total[node] = std::array::from_fn(|i| impulses[node][i] + held.friction[i]);
+                let sliding = if held.grip.sticks { [0.0; 3] } else { held.grip.impulse(held.slip(by[node])) };
+                total[node] = std::array::from_fn(|i| impulses[node][i] + sliding[i]);
             }
             let goes_on = holding.look(contact, &passages, &Attempt { u: &u, by: &by, impulses: &impulses }, tolerance);
             if !goes_on || attempt == ATTEMPTS {
