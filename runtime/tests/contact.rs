@@ -447,6 +447,20 @@ fn warned(of: &str, by: &str) -> Vec<String> {
     model.unwrap_or_else(|e| panic!("{e}")).warnings
 }
 
+/// A mesh of two parts is warned of, because they would pass through each other.
+#[test]
+fn parts_do_not_meet() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n8\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 0 0 2\n6 1 0 2\n7 0 1 2\n\
+                8 0 0 3\n$EndNodes\n$Elements\n2\n1 4 2 1 1 1 2 3 4\n2 4 2 1 1 5 6 7 8\n$EndElements\n";
+    let path = folder.path().join("two.msh");
+    std::fs::write(&path, text).expect("written");
+    let mesh = format!("file = {:?}", path.display().to_string());
+    let scene = falling(&mesh, "{ plane = { point = [0, 0, -1], normal = [0, 0, 1] } }", "hooke", "f64", 1e-4, 0.01);
+    let warnings = tensormass_runtime::model::build(&scene).unwrap_or_else(|e| panic!("{e}")).warnings;
+    assert!(warnings.iter().any(|w| w.starts_with("the mesh has 2 parts that share no node")), "{warnings:?}");
+}
+
 /// Lengths in mm and a stiffness in kPa are warned of, no scene of the repository is.
 #[test]
 fn units_that_look_wrong_are_warned_of() {

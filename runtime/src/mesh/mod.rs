@@ -8,6 +8,7 @@ mod gradients;
 mod incidence;
 mod locate;
 mod map;
+mod parts;
 mod quality;
 pub mod surface;
 mod topology;

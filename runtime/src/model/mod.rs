@@ -78,6 +78,13 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
             quality.worst_element.0, quality.worst_radius_ratio
         ));
     }
+    let parts = mesh.parts();
+    if parts > 1 {
+        warnings.push(format!(
+            "the mesh has {parts} parts that share no node: contact is modelled with obstacles only, so that parts pass through each \
+             other where they meet; join them, or make all but one of them obstacles"
+        ));
+    }
     let places = Places::new(&mesh);
     let assignment = material::assign(scene, &mesh, &places)?;
     let [low, high] = mesh.bounding_box();

@@ -20,7 +20,7 @@ pub struct SceneData {
     /// About the scene itself.
     #[serde(default)]
     pub scene: About,
-    /// The body: exactly one source of nodes and elements.
+    /// The body, one a scene: exactly one source of nodes and elements. Bodies do not touch each other, but obstacles.
     pub mesh: Mesh,
     /// What the body is made of; one entry a law, or several of one law over different elements.
     #[schemars(length(min = 1))]
