@@ -7,6 +7,7 @@ mod law;
 mod plan;
 mod run;
 mod text;
+mod tradeoff;
 
 use std::process::ExitCode;
 
@@ -37,6 +38,8 @@ enum Command {
     Devices(devices::Arguments),
     /// Measures how many elements a second this machine computes.
     Bench(bench::Arguments),
+    /// Measures what accuracy of a scene costs: settings against a converged reference.
+    Tradeoff(tradeoff::Arguments),
     /// Constitutive laws: what this build has, and derivations of new ones.
     #[command(subcommand)]
     Law(law::Command),
@@ -49,6 +52,7 @@ impl Command {
             Command::Plan(arguments) => plan::call(&arguments),
             Command::Devices(arguments) => devices::call(&arguments),
             Command::Bench(arguments) => bench::call(&arguments),
+            Command::Tradeoff(arguments) => tradeoff::call(&arguments),
             Command::Law(command) => law::call(command),
         }
     }

@@ -64,7 +64,17 @@ enum Reader {
     Energy(EnergyPart),
     Volume(Vec<u32>),
     Stress { elements: Vec<u32>, component: StressComponent, statistic: Statistic },
-    PointStress { at: MaterialPoint, law: One, unit: f64, component: StressComponent },
+    PointStress(Box<PointStress>),
+}
+
+/// The stress at a material point.
+#[derive(Debug)]
+struct PointStress {
+    at: MaterialPoint,
+    law: One,
+    /// Pa in its unit of stress.
+    unit: f64,
+    component: StressComponent,
 }
 
 /// The probes of a scene, resolved on its mesh.
@@ -155,7 +165,7 @@ impl Recorder {
                         )
                     })?;
                     let law = law_at(at.element, batches).expect("each element has a law");
-                    Reader::PointStress { at, law, unit: scale.stress, component: *component }
+                    Reader::PointStress(Box::new(PointStress { at, law, unit: scale.stress, component: *component }))
                 }
             };
             readers.push(reader);
@@ -226,7 +236,8 @@ impl Recorder {
                     .map(|&e| (of_stress(&state.stresses[e as usize], *component), self.volumes[e as usize]));
                 reduce(values, *statistic)
             }
-            Reader::PointStress { at, law, unit, component } => {
+            Reader::PointStress(point) => {
+                let PointStress { at, law, unit, component } = &**point;
                 let g = at.displacement_gradient(mesh, &state.displacement);
                 of_stress(&law.cauchy(&g).map(|x| x * unit), *component)
             }

@@ -7,6 +7,7 @@ mod support;
 use meshes::{distorted, unit};
 use support::{CANTILEVER, Random, done, probe, scene};
 use tensormass_kernels::{ElementEntry, elements};
+use tensormass_runtime::mesh::Locator;
 use tensormass_runtime::model::build;
 
 /// A random place in an element's shape, of a corner's coordinates or further inside.
@@ -33,6 +34,7 @@ fn gradients_are_those_of_the_displacement() {
                 .iter()
                 .map(|x| std::array::from_fn(|i| (0..3).map(|k| a[i][k] * x[k]).sum::<f64>() + b[i] * x[0] * x[1]))
                 .collect();
+            let locator = Locator::new(&mesh);
             let mut found = vec![0; mesh.len()];
             for e in mesh.elements() {
                 for _ in 0..10 {
@@ -41,8 +43,15 @@ fn gradients_are_those_of_the_displacement() {
                     let nodes = mesh.positions(mesh.element_nodes(e));
                     let x: [f64; 3] =
                         std::array::from_fn(|c| nodes.iter().zip(&values).map(|(x, value)| x[c] * value).sum());
+                    assert_eq!(locator.find(x), mesh.material_point(x), "{}: {x:?}", element.info.name);
                     let point = mesh.material_point(x).unwrap_or_else(|| panic!("{}: {x:?}", element.info.name));
                     found[e.0 as usize] += usize::from(point.element == e);
+                    let here = point.displacement(&mesh, &u);
+                    for i in 0..3 {
+                        let wanted = (0..3).map(|k| a[i][k] * x[k]).sum::<f64>() + b[i] * x[0] * x[1];
+                        let plane = if plane { a[i][2] * x[2] } else { 0.0 };
+                        assert!((here[i] - wanted + plane).abs() < 1e-12, "{}, {x:?}: {here:?}", element.info.name);
+                    }
                     let g = point.displacement_gradient(&mesh, &u);
                     for k in 0..9 {
                         let (i, j) = (k / 3, k % 3);

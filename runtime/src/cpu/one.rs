@@ -14,6 +14,13 @@ fn padded(u: &[[f64; 3]]) -> Vec<Node<f64>> {
     u.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect()
 }
 
+/// Displacements of the tetrahedron's nodes with this gradient: those of the last three nodes' functions are the unit vectors.
+fn at_nodes(g: &[f64; 9]) -> [[f64; 3]; 4] {
+    let mut u = [[0.0; 3]; 4];
+    (0..9).for_each(|k| u[1 + k % 3][k / 3] = g[k]);
+    u
+}
+
 impl std::fmt::Debug for One {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("One").finish_non_exhaustive()
@@ -45,12 +52,18 @@ impl One {
 
     /// The Cauchy stress, row by row, of a [`One::point`] with this displacement gradient.
     pub fn cauchy(&self, g: &[f64; 9]) -> [f64; 9] {
-        // The gradients of the functions of the last three nodes are the unit vectors.
-        let mut u = [[0.0; 3]; 4];
-        (0..9).for_each(|k| u[1 + k % 3][k / 3] = g[k]);
         let mut stress = [[0.0; 9]];
-        self.compute.cauchy(self.blocks.part(0), &padded(&u), &mut stress);
+        self.compute.cauchy(self.blocks.part(0), &padded(&at_nodes(g)), &mut stress);
         stress[0]
+    }
+
+    /// The differential of the first Piola-Kirchhoff stress, row by row, of a [`One::point`] at a displacement gradient in the
+    /// direction of another.
+    pub fn stress_differential(&self, g: &[f64; 9], dg: &[f64; 9]) -> [f64; 9] {
+        let mut df = [[0.0; 3]; 4];
+        self.dforce(&at_nodes(g), &at_nodes(dg), &mut df);
+        // Of weight 1: the force differential at a node is minus dP times the gradient of its function.
+        std::array::from_fn(|k| -df[1 + k % 3][k / 3])
     }
 
     /// What is added to zeros at the nodes.

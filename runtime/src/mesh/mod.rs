@@ -19,7 +19,7 @@ pub use beam::{beam, beam_of};
 pub use error::{GroupKind, MeshError};
 pub use gradients::{ShapeGradients, shape_gradients};
 pub use incidence::Incidence;
-pub use locate::MaterialPoint;
+pub use locate::{Locator, MaterialPoint};
 pub(crate) use map::point_volumes;
 pub use map::{integrals, tangents};
 pub use quality::Quality;

@@ -19,6 +19,7 @@ use crate::gpu::{GpuBackend, GpuField};
 use crate::model::{BuildError, Model, build};
 use crate::output::OutputError;
 use crate::plan::Layout;
+use crate::probe::Energies;
 use crate::scene::{self, Scene};
 use crate::step_limit::StepLimits;
 use crate::system::SolveError;
@@ -90,6 +91,27 @@ pub trait Observer {
     fn progress(&mut self, step: u64, steps: u64);
     /// Whether to stop after the current step.
     fn interrupted(&self) -> bool;
+    /// The steps, ascending, after which it wants a [`Sample`]; 0 is the beginning.
+    fn samples(&self, _steps: u64) -> Vec<u64> {
+        vec![]
+    }
+    /// The state after one of those.
+    fn sample(&mut self, _sample: Sample) {}
+}
+
+/// A state for an observer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sample {
+    /// After this step.
+    pub step: u64,
+    /// Its time in s.
+    pub time: f64,
+    /// The displacement of each node in m.
+    pub displacement: Vec<[f64; 3]>,
+    /// Energies in J.
+    pub energies: Energies,
+    /// The value of each probe, in the scene's order, where probes are recorded at this step; else none.
+    pub probes: Vec<f64>,
 }
 
 /// An observer that follows nothing.

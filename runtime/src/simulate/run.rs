@@ -20,7 +20,7 @@ use super::checkpoint::{Checkpoint, header};
 use super::impulses::{Impulses, Record};
 use super::setup::{Stepper, integrator, stepping};
 use super::watch::Watch;
-use super::{Ending, Observer, Outcome, RunError};
+use super::{Ending, Observer, Outcome, RunError, Sample};
 
 /// The name of the file of the newest checkpoint.
 const CHECKPOINT: &str = "checkpoint.tmc";
@@ -38,6 +38,8 @@ pub(super) struct Run<'a, B: Backend, F: ForceField<B>> {
     cost: StepReport,
     pub(super) warnings: Vec<String>,
     limits: Option<StepLimits>,
+    /// Steps whose states the observer wants.
+    samples: Vec<u64>,
     watch: Watch,
     impulses: Impulses,
     layout: Layout,
@@ -65,6 +67,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
             cost: StepReport::default(),
             warnings,
             limits: None,
+            samples: vec![],
             watch: Watch::default(),
             impulses: Impulses::default(),
             layout,
@@ -90,6 +93,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
                 ));
             }
         }
+        self.samples = observer.samples(self.steps);
         let until = from.map(|from| self.step * from.step() as f64 * self.model.scale.time);
         let mut results = Results::create(self.scene, &self.model, out, until)?;
         let of_frames = results.frames.as_ref().is_some_and(|frames| frames.needs().contact);
@@ -108,7 +112,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
                 self.go_on(from);
                 Ok(())
             }
-            None => self.record(&mut results)?,
+            None => self.record(&mut results, observer)?,
         };
         let ending = match begun {
             Err(e) => Ending::Failed(e),
@@ -165,7 +169,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
                 }
             }
             if self.is_recorded(self.state.step)
-                && let Err(e) = self.record(results)?
+                && let Err(e) = self.record(results, observer)?
             {
                 return Ok(Ending::Failed(e));
             }
@@ -189,6 +193,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         (probes && output.wants_probes(step, self.steps))
             || output.wants_frame(step, self.steps)
             || output.wants_checkpoint(step, self.steps)
+            || self.samples.binary_search(&step).is_ok()
     }
 
     /// Steps that may be taken before anything is recorded, as many as the backend likes to take without being looked at.
@@ -334,7 +339,11 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
     }
 
     /// Records probes and a frame, where the scene wants them now.
-    fn record(&mut self, results: &mut Results) -> Result<Result<(), SolveError>, OutputError> {
+    fn record(
+        &mut self,
+        results: &mut Results,
+        observer: &mut (dyn Observer + Send),
+    ) -> Result<Result<(), SolveError>, OutputError> {
         let time = self.state.time * self.model.scale.time;
         if self.scene.output.wants_probes(self.state.step, self.steps) {
             let snapshot = match self.snapshot(self.model.recorder.needs()) {
@@ -348,6 +357,12 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
                 table.append(&row)?;
             }
         }
+        if self.samples.binary_search(&self.state.step).is_ok() {
+            match self.sample(results) {
+                Ok(sample) => observer.sample(sample),
+                Err(e) => return Ok(Err(e)),
+            }
+        }
         if let Some(frames) = &mut results.frames
             && self.scene.output.wants_frame(self.state.step, self.steps)
         {
@@ -358,6 +373,20 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
             }
         }
         Ok(Ok(()))
+    }
+
+    /// The state for an observer.
+    fn sample(&mut self, results: &Results) -> Result<Sample, SolveError> {
+        let has_probes = self.scene.output.wants_probes(self.state.step, self.steps);
+        let sample = Sample {
+            step: self.state.step,
+            time: self.state.time * self.model.scale.time,
+            displacement: self.in_si(&self.state.u, self.model.scale.length),
+            energies: self.energies()?,
+            probes: if has_probes { results.last.clone() } else { vec![] },
+        };
+        self.system.backend.check()?;
+        Ok(sample)
     }
 
     fn snapshot(&mut self, needs: Needs) -> Result<Snapshot, SolveError> {

@@ -1,0 +1,64 @@
+//! Which setting to run next: the scene's own, then one axis at a time, then what is one choice away from the front.
+
+use crate::experiment::{Measured, Status};
+use crate::front::front;
+use crate::space::{Axis, Setting, Space};
+use crate::trajectory::Metric;
+
+/// A mesh with twice as many cells each way takes at least so many times as long, in implicit and in explicit steps.
+const FINER: [f64; 2] = [8.0, 14.0];
+
+/// The next setting; none where all that could pay have been run.
+pub(crate) fn next(space: &Space, measured: &[Measured], metric: Metric, longest: f64) -> Option<Setting> {
+    let is_open = |setting: &Setting| {
+        space.allows(setting)
+            && !measured.iter().any(|m| m.setting == *setting)
+            && predicted(space, setting, measured) <= longest
+    };
+    let base = space.base();
+    if is_open(&base) {
+        return Some(base);
+    }
+    // The nearest choices of each axis first, an axis after the other.
+    let reach = Axis::ALL.iter().map(|axis| space.choices(*axis).len()).max().unwrap_or(1);
+    for distance in 1..reach {
+        for axis in Axis::ALL {
+            let found = beside(space, &base, axis, distance).into_iter().find(&is_open);
+            if found.is_some() {
+                return found;
+            }
+        }
+    }
+    // The most accurate of the front first: what is cheap has the most neighbours that are not worth their time.
+    let best = front(measured, metric);
+    for member in best.iter().rev() {
+        for axis in Axis::ALL {
+            let found = beside(space, &member.setting, axis, 1).into_iter().find(&is_open);
+            if found.is_some() {
+                return found;
+            }
+        }
+    }
+    None
+}
+
+/// The settings that are so many choices away on an axis.
+fn beside(space: &Space, setting: &Setting, axis: Axis, distance: usize) -> Vec<Setting> {
+    let (at, count) = (setting.on(axis), space.choices(axis).len());
+    let below = at.checked_sub(distance);
+    let above = Some(at + distance).filter(|k| *k < count);
+    below.into_iter().chain(above).map(|k| setting.with(axis, k)).collect()
+}
+
+/// A time in s that a setting takes at least, as far as its coarser meshes tell.
+fn predicted(space: &Space, setting: &Setting, measured: &[Measured]) -> f64 {
+    let finer = FINER[usize::from(space.integrator(setting).is_explicit())];
+    let mesh = setting.on(Axis::Mesh);
+    let coarser = (0..mesh).filter_map(|k| {
+        let coarse = setting.with(Axis::Mesh, k);
+        let found = measured.iter().find(|m| m.setting == coarse)?;
+        let times = finer.powi((mesh - k) as i32);
+        Some(if found.status == Status::TooSlow { f64::INFINITY } else { found.wall() * times })
+    });
+    coarser.fold(0.0, f64::max)
+}
