@@ -79,11 +79,12 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
             let found = report.recommended().into_iter().find(|(t, _)| *t == target).and_then(|(_, found)| found);
             let found = found.ok_or_else(|| {
                 Failure::Other(format!(
-                    "no setting measured has an error of {target} or less; give a larger --budget to go on; the front is in {}",
+                    "no setting measured has an error of {target} or less ({}); give a larger --budget to go on; the front is in {}",
+                    report.why_not(target),
                     arguments.out.join("report.html").display()
                 ))
             })?;
-            text::print(&format!("{}\n", report.arguments(found)))
+            text::print(&format!("{}\n", report.arguments(found).join(" ")))
         }
     }
 }

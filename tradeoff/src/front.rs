@@ -1,6 +1,7 @@
 //! Settings that none beats, and the cheapest that is accurate enough.
 
 use crate::experiment::Measured;
+use crate::reference::Reference;
 use crate::trajectory::Metric;
 
 /// The settings than which none is both cheaper and more accurate, by ascending time.
@@ -17,8 +18,15 @@ pub fn front(measured: &[Measured], metric: Metric) -> Vec<&Measured> {
     done.into_iter().map(|(m, _)| m).collect()
 }
 
-/// The cheapest setting measured whose error is at most this.
-pub fn cheapest(measured: &[Measured], metric: Metric, target: f64) -> Option<&Measured> {
-    let fits = |m: &&Measured| m.errors.is_some_and(|e| e.of(metric) <= target);
+/// The cheapest setting measured that has at most this error, whatever the reference's uncertainty does to it: the two add up to
+/// no more.
+pub fn cheapest<'a>(
+    measured: &'a [Measured],
+    reference: &Reference,
+    metric: Metric,
+    target: f64,
+) -> Option<&'a Measured> {
+    let uncertainty = reference.uncertainty().of(metric);
+    let fits = |m: &&Measured| m.errors.is_some_and(|e| e.of(metric) + uncertainty <= target);
     measured.iter().filter(fits).min_by(|a, b| a.wall().total_cmp(&b.wall()))
 }

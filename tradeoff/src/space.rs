@@ -94,7 +94,7 @@ impl Setting {
 pub struct Choice {
     /// Its name in reports.
     pub name: String,
-    /// Changes to the scene that it means.
+    /// Changes to the scene that it means; without spaces, so that shells take each for a word.
     changes: Vec<String>,
 }
 
@@ -234,6 +234,9 @@ impl Space {
     /// The step of a setting in s; none in statics.
     fn step(&self, setting: &Setting, changes: &[String]) -> Result<Option<f64>, SpaceError> {
         let (Some(duration), Some(own)) = (self.scene.solver.duration, self.scene.solver.step) else { return Ok(None) };
+        if self.integrator(setting) == Integrator::Static {
+            return Ok(None);
+        }
         let own_explicit = self.scene.solver.integrator.is_explicit();
         let wanted = match (self.integrator(setting).is_explicit(), own_explicit) {
             (true, _) => {
@@ -293,7 +296,7 @@ fn law_choices(scene: &Scene, model: &Model) -> (Vec<Choice>, usize) {
             let of = |(k, [young, poisson]): (usize, &[f64; 2])| {
                 vec![
                     format!("material.{k}.law={}", law.info.name),
-                    format!("material.{k}.parameters={{ young = {young:?}, poisson = {poisson:?} }}"),
+                    format!("material.{k}.parameters={{young={young:?},poisson={poisson:?}}}"),
                 ]
             };
             let changes = moduli.iter().enumerate().flat_map(of).collect();
@@ -327,7 +330,10 @@ fn mesh_choices(scene: &Scene) -> (Vec<Choice>, usize) {
     };
     match &scene.mesh {
         Mesh::Beam { beam } => {
-            let of = |f| choice(vec![format!("mesh.beam.cells={:?}", beam.cells.map(|n| scaled(n, f)))], f);
+            let of = |f| {
+                let [x, y, z] = beam.cells.map(|n| scaled(n, f));
+                choice(vec![format!("mesh.beam.cells=[{x},{y},{z}]")], f)
+            };
             (factors.into_iter().map(of).collect(), 2)
         }
         Mesh::Torus { torus } => {

@@ -193,7 +193,7 @@ impl Study {
     fn that_matter(&self, budget: Budget) -> Vec<&Measured> {
         let mut matter = front(&self.measured, budget.metric);
         for target in TARGETS.into_iter().chain(budget.target) {
-            if let Some(found) = cheapest(&self.measured, budget.metric, target)
+            if let Some(found) = cheapest(&self.measured, &self.reference, budget.metric, target)
                 && !matter.iter().any(|m| m.setting == found.setting)
             {
                 matter.push(found);

@@ -58,24 +58,27 @@ impl<'a> Report<'a> {
         front(&self.study.measured, self.budget.metric)
     }
 
-    /// For each error wanted, the cheapest setting measured that has it.
+    /// For each error wanted, the cheapest setting measured that has it: its error and the reference's uncertainty add up to no more.
     pub fn recommended(&self) -> Vec<(f64, Option<&'a Measured>)> {
         let own = self.budget.target.filter(|target| !TARGETS.contains(target));
         let mut targets: Vec<f64> = TARGETS.into_iter().chain(own).collect();
         targets.sort_by(|a, b| b.total_cmp(a));
-        targets.into_iter().map(|t| (t, cheapest(&self.study.measured, self.budget.metric, t))).collect()
+        let of = |target| cheapest(&self.study.measured, &self.study.reference, self.budget.metric, target);
+        targets.into_iter().map(|target| (target, of(target))).collect()
     }
 
-    /// A setting as arguments of `tensormass run`.
-    pub fn arguments(&self, measured: &Measured) -> String {
+    /// A setting as arguments of `tensormass run`, each a word.
+    pub fn arguments(&self, measured: &Measured) -> Vec<String> {
         let changes = self.space.changes(&measured.setting).unwrap_or_default();
         let device = self.space.names(&measured.setting)[Axis::Device as usize].to_string();
-        let quoted = |change: &String| {
-            if change.contains([' ', '{', '[']) { format!("--set '{change}'") } else { format!("--set {change}") }
-        };
-        let mut arguments: Vec<String> = changes.iter().map(quoted).collect();
-        arguments.push(format!("--device {device}"));
-        arguments.join(" ")
+        let set = changes.into_iter().flat_map(|change| ["--set".to_string(), change]);
+        set.chain(["--device".to_string(), device]).collect()
+    }
+
+    /// The same to be typed: what a shell would take for a pattern is in quotation marks.
+    pub fn typed(&self, measured: &Measured) -> String {
+        let word = |word: String| if word.contains(['{', '[']) { format!("'{word}'") } else { word };
+        self.arguments(measured).into_iter().map(word).collect::<Vec<_>>().join(" ")
     }
 
     /// A setting in words: what differs from the scene's own.
@@ -123,11 +126,21 @@ impl<'a> Report<'a> {
         }
         for (target, found) in self.recommended() {
             text += &match found {
-                Some(m) => format!("{}: {:.3} s with {}\n", percent(target), m.wall(), self.arguments(m)),
-                None => format!("{}: not reached\n", percent(target)),
+                Some(m) => format!("{}: {:.3} s with {}\n", percent(target), m.wall(), self.typed(m)),
+                None => format!("{}: {}\n", percent(target), self.why_not(target)),
             };
         }
         text
+    }
+
+    /// Why no setting has an error.
+    pub fn why_not(&self, target: f64) -> String {
+        let uncertainty = self.study.reference.uncertainty().of(self.budget.metric);
+        if uncertainty >= target {
+            format!("not resolved: the reference is uncertain by {}", percent(uncertainty))
+        } else {
+            "not reached".into()
+        }
     }
 
     fn json(&self) -> Value {
@@ -153,7 +166,10 @@ impl<'a> Report<'a> {
         let recommended: Vec<Value> = self
             .recommended()
             .into_iter()
-            .map(|(target, found)| json!({ "target": target, "arguments": found.map(|m| self.arguments(m)), "setting": found.map(one) }))
+            .map(|(target, found)| {
+                let arguments = found.map(|m| self.arguments(m));
+                json!({ "target": target, "arguments": arguments, "setting": found.map(one) })
+            })
             .collect();
         json!({
             "scene": self.space.scene().path().display().to_string(),

@@ -22,8 +22,8 @@ pub(super) fn html(report: &Report, diagrams: &[(String, String)]) -> String {
     text += "<h2>Which setting for which error</h2>\n<table><tr><th>error</th><th>time</th><th>arguments of tensormass run</th></tr>\n";
     for (target, found) in report.recommended() {
         let (time, how) = found.map_or_else(
-            || (String::new(), "not reached".to_string()),
-            |m| (format!("{:.3} s", m.wall()), format!("<code>{}</code>", escaped(&report.arguments(m)))),
+            || (String::new(), escaped(&report.why_not(target))),
+            |m| (format!("{:.3} s", m.wall()), format!("<code>{}</code>", escaped(&report.typed(m)))),
         );
         text += &format!("<tr><td>{}</td><td class=\"n\">{time}</td><td>{how}</td></tr>\n", percent(target));
     }
