@@ -110,7 +110,7 @@ fn a_study_finds_what_holds() {
     std::fs::write(&scene, BEAM).expect("written");
     let space = Space::of(&scene, &[], &[]).unwrap_or_else(|e| panic!("{e}"));
     let out = folder.path().join("out");
-    let (study, did) = conduct(&space, &out, 30.0);
+    let (study, did) = conduct(&space, &out, 15.0);
     assert!(did[0].starts_with("reference"), "{did:?}");
 
     // The scene's own setting comes first, then one axis at a time, each setting once.
@@ -135,7 +135,7 @@ fn a_study_finds_what_holds() {
     // The front is ordered, and what is recommended holds when it is run again, from the arguments that are printed.
     let best = front(&study.measured, Metric::Displacement);
     assert!(best.windows(2).all(|pair| pair[0].wall() <= pair[1].wall() && error(pair[0]) > error(pair[1])));
-    let report = Report::new(&space, &study, budget(30.0));
+    let report = Report::new(&space, &study, budget(15.0));
     let (target, found) = report.recommended()[1];
     assert_eq!(target, 0.05);
     let found = found.expect("5 % is reached");
