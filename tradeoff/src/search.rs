@@ -1,4 +1,5 @@
-//! Which setting to run next: the scene's own, then one axis at a time, then what is one choice away from the front.
+//! Which setting to run next: the scene's own, then one axis at a time, then what is one choice away from the front, cheap ones
+//! first.
 
 use crate::experiment::{Measured, Status};
 use crate::front::front;
@@ -29,17 +30,24 @@ pub(crate) fn next(space: &Space, measured: &[Measured], metric: Metric, longest
             }
         }
     }
-    // The most accurate of the front first: what is cheap has the most neighbours that are not worth their time.
-    let best = front(measured, metric);
-    for member in best.iter().rev() {
-        for axis in Axis::ALL {
-            let found = beside(space, &member.setting, axis, 1).into_iter().find(&is_open);
-            if found.is_some() {
-                return found;
-            }
-        }
-    }
-    None
+    // What is cheap first: many such settings take no longer than one that is dear.
+    let members = front(measured, metric);
+    let beside = members.iter().flat_map(|member| {
+        let other = move |axis: Axis| (0..space.choices(axis).len()).map(move |k| member.setting.with(axis, k));
+        Axis::ALL.into_iter().flat_map(other)
+    });
+    let open = beside.filter(&is_open).map(|setting| (expected(space, &setting, measured), setting));
+    open.min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, setting)| setting)
+}
+
+/// A time in s that a setting may take, if what each choice does to the time of the scene's own setting it does to all; what is not
+/// known of a choice is taken to do nothing.
+fn expected(space: &Space, setting: &Setting, measured: &[Measured]) -> f64 {
+    let base = space.base();
+    let time = |setting: &Setting| measured.iter().find(|m| m.setting == *setting).map(Measured::wall);
+    let whole = time(&base).unwrap_or(1.0);
+    let choices = setting.differs(&base).into_iter();
+    choices.fold(whole, |t, axis| t * time(&base.with(axis, setting.on(axis))).map_or(1.0, |alone| alone / whole))
 }
 
 /// The settings that are so many choices away on an axis.
