@@ -71,7 +71,7 @@ impl CpuContact {
                 if nearest(seen.from).distance > travel + self.tolerance {
                     continue;
                 }
-                let Obstacle { sticking, sliding, .. } = obstacle.clone();
+                let Obstacle { sticking, sliding, .. } = *obstacle;
                 let surface = Surface { sticking, sliding, tolerance: self.tolerance };
                 let response = respond(meets(nearest, obstacle.shape.approach(), seen, self.tolerance), seen, surface);
                 let [kick, push] = [response.change, response.push].map(|x| passage.outside(x));
