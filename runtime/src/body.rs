@@ -207,3 +207,21 @@ impl Body {
         self.batches.iter().any(|b| b.law.damping.is_some())
     }
 }
+
+/// The state of the nodes at time 0, in scaled units; imposed components have their own.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Start {
+    /// Displacements; none where they are zero.
+    pub displacement: Option<Vec<[f64; 3]>>,
+    /// Velocities; none where they are the same.
+    pub velocities: Option<Vec<[f64; 3]>>,
+    /// The velocity of every node, where they are the same.
+    pub velocity: [f64; 3],
+}
+
+impl Start {
+    /// The state of nodes that have this velocity and are at rest otherwise.
+    pub fn moving(velocity: [f64; 3]) -> Self {
+        Self { velocity, ..Self::default() }
+    }
+}

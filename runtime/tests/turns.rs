@@ -52,3 +52,62 @@ fn torsion_is_saint_venants() {
     eprintln!("{elastic:e} J, {wanted:e} J if the ends could warp");
     assert!(elastic >= wanted && elastic <= wanted * length / (length - 1.0), "{elastic:e} J, {wanted:e} J wanted");
 }
+
+/// A body that begins turned and spinning: its gradient is a rotation, which stores nothing; its kinetic energy is that of a
+/// rigid body about its centre of mass, plus that of its travel; and without forces it keeps both momenta.
+#[test]
+fn begins_turned_and_spinning() {
+    // A quarter turn about z, about the corner at the origin; 3 rad/s about x.
+    let text = "[mesh]\nbeam = { size = [2, 1, 1], cells = [2, 1, 1] }\n[[material]]\nlaw = \"neo_hookean\"\n\
+        density = 1000.0\nparameters = { young = 1e7, poisson = 0.3 }\n[initial]\nvelocity = [0, 0, 2]\n\
+        angular_velocity = [3, 0, 0]\ngradient = [[-1, -1, 0], [1, -1, 0], [0, 0, 0]]\nabout = [0, 0, 0]\n[solver]\n\
+        integrator = \"central-difference\"\nstep = 1e-4\nduration = 0.1\n[output]\nframes = 0\n";
+    let scene = scene::<&str>(text, &[]);
+    let model = tensormass_runtime::model::build(&scene).unwrap_or_else(|e| panic!("{e}"));
+    let start = &model.start;
+    let (u, v) = (start.displacement.as_ref().expect("turned"), start.velocities.as_ref().expect("spinning"));
+    let (length, time) = (model.scale.length, model.scale.time);
+    let masses = &model.body.masses;
+    let whole: f64 = masses.iter().sum();
+    let moved: Vec<[f64; 3]> = model.mesh.nodes().iter().map(|[x, y, z]| [-y, *x, *z]).collect();
+    let centre: [f64; 3] =
+        std::array::from_fn(|i| moved.iter().zip(masses).map(|(x, m)| x[i] * m).sum::<f64>() / whole);
+    let mut kinetic = 0.0;
+    for (((rest, moved), (u, v)), mass) in model.mesh.nodes().iter().zip(&moved).zip(u.iter().zip(v)).zip(masses) {
+        let wanted = [0.0, -3.0 * (moved[2] - centre[2]), 2.0 + 3.0 * (moved[1] - centre[1])];
+        for i in 0..3 {
+            assert!((u[i] * length - (moved[i] - rest[i])).abs() < 1e-14, "{u:?} at {rest:?}");
+            assert!((v[i] * length / time - wanted[i]).abs() < 1e-13, "{v:?} at {rest:?}");
+        }
+        kinetic += 0.5 * mass * model.scale.density() * length.powi(3) * wanted.map(|x| x * x).iter().sum::<f64>();
+    }
+    struct Samples(Vec<tensormass_runtime::simulate::Sample>);
+    impl tensormass_runtime::simulate::Observer for Samples {
+        fn warning(&mut self, _: &str) {}
+        fn limits(&mut self, _: tensormass_runtime::step_limit::StepLimits) {}
+        fn progress(&mut self, _: u64, _: u64) {}
+        fn interrupted(&self) -> bool {
+            false
+        }
+        fn samples(&self, steps: u64) -> Vec<u64> {
+            vec![0, steps]
+        }
+        fn sample(&mut self, sample: tensormass_runtime::simulate::Sample) {
+            self.0.push(sample);
+        }
+    }
+    let mut samples = Samples(vec![]);
+    tensormass_runtime::simulate::run(&scene, None, &mut samples).unwrap_or_else(|e| panic!("{e}"));
+    let [first, last] = &samples.0[..] else { panic!("two samples") };
+    assert!((first.energies.kinetic / kinetic - 1.0).abs() < 1e-12, "{} J, {kinetic} J", first.energies.kinetic);
+    assert!(first.energies.elastic.abs() < 1e-20 * 1e7, "{} J", first.energies.elastic);
+    // It is stretched by its spin, and gives that back: all of it is kept.
+    let total = last.energies.total();
+    assert!((total / kinetic - 1.0).abs() < 1e-4, "{total} J, {kinetic} J");
+    // It travels as its centre does.
+    let centre = |s: &tensormass_runtime::simulate::Sample| {
+        s.displacement.iter().zip(masses).map(|(u, m)| u[2] * m).sum::<f64>() / whole
+    };
+    let way = centre(last) - centre(first);
+    assert!((way - 0.2).abs() < 1e-12, "{way} m");
+}

@@ -4,6 +4,7 @@
 //! nothing, parameters that a law does not have or refuses. Errors point into the scene file.
 
 mod boundary;
+mod initial;
 pub(crate) mod loads;
 mod material;
 mod obstacle;
@@ -15,10 +16,10 @@ use std::sync::Arc;
 
 use tensormass_kernels::{ElementEntry, RestPoint};
 
-use crate::body::{Body, Rows};
+use crate::body::{Body, Rows, Start};
 use crate::mass::{self, MassMatrix};
 use crate::mesh::gmsh::{self, MeshFileError};
-use crate::mesh::{self, Mesh, MeshError, Orientation, Quality, Ring};
+use crate::mesh::{self, ElementId, Mesh, MeshError, Orientation, Quality, Ring};
 use crate::probe::Recorder;
 use crate::scale::Scale;
 use crate::scene::{self, Scene, SceneError};
@@ -54,10 +55,17 @@ pub struct Model {
     pub materials: Vec<MaterialReport>,
     /// Which of them each element has.
     pub(crate) assignment: material::Assignment,
-    /// Initial velocity, scaled.
-    pub velocity: [f64; 3],
+    /// The state at time 0.
+    pub start: Start,
     /// What is allowed but looks wrong.
     pub warnings: Vec<String>,
+}
+
+impl Model {
+    /// The components of all parameters of an element's law, in their order and in the scene's units.
+    pub fn parameters(&self, element: ElementId) -> &[f64] {
+        self.assignment.parameters(element.0)
+    }
 }
 
 /// Elements of a lower radius ratio are worth a warning; mesh generators keep to .1 and better.
@@ -130,7 +138,7 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
     warnings.extend(units::warnings(scene, &mesh, assignment.stiffness(), assignment.density()));
     let contact = obstacle::contact(scene, &mesh, &constraints, &scale)?;
     let recorder = Recorder::new(scene, &mesh, &places, &constraints, &batches, &scale)?;
-    let velocity = scene.initial.velocity.map(|v| v / scale.velocity());
+    let start = initial::start(scene, &mesh, &masses, &scale)?;
     let body = Body {
         elements,
         rest,
@@ -148,7 +156,7 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
         diameter: diagonal / scale.length,
         volume: mesh.total_volume() / scale.length.powi(3),
     };
-    Ok(Model { materials: assignment.reports(), assignment, quality, mesh, body, scale, recorder, velocity, warnings })
+    Ok(Model { materials: assignment.reports(), assignment, quality, mesh, body, scale, recorder, start, warnings })
 }
 
 /// The quadrature points of all elements, in scaled lengths.

@@ -63,8 +63,13 @@ pub(super) fn warnings(data: &SceneData, document: &Document) -> Vec<String> {
     if still && solver.mass != Mass::Lumped {
         warnings.push("solver.mass has no effect: static equilibrium has no inertia".to_owned());
     }
-    if still && data.initial.velocity != [0.0; 3] {
-        warnings.push("initial.velocity has no effect: static equilibrium has no motion".to_owned());
+    for (key, value) in [("velocity", data.initial.velocity), ("angular_velocity", data.initial.angular_velocity)] {
+        if still && value != [0.0; 3] {
+            warnings.push(format!("initial.{key} has no effect: static equilibrium has no motion"));
+        }
+    }
+    if data.initial.about.is_some() && data.initial.gradient == [[0.0; 3]; 3] {
+        warnings.push("initial.about has no effect: initial.gradient is zero".to_owned());
     }
     warnings
 }

@@ -423,6 +423,18 @@ pub struct Initial {
     #[serde(default)]
     #[schemars(inner(range(min = -1e6, max = 1e6)))]
     pub velocity: [f64; 3],
+    /// Angular velocity of the body as a whole about its centre of mass in rad/s, each component within +-1e6.
+    #[serde(default)]
+    #[schemars(inner(range(min = -1e6, max = 1e6)))]
+    pub angular_velocity: [f64; 3],
+    /// Gradient of the displacement, row by row, the same everywhere, each component within +-1e6.
+    #[serde(default)]
+    #[schemars(inner(inner(range(min = -1e6, max = 1e6))))]
+    pub gradient: [[f64; 3]; 3],
+    /// The point in m that this gradient does not move, each coordinate within +-1e6; without it the centre of mass.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(inner(range(min = -1e6, max = 1e6))))]
+    pub about: Option<[f64; 3]>,
 }
 
 fn one() -> f64 {

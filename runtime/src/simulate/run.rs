@@ -53,7 +53,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         let integrator = integrator(scene, &backend, body.masses.len());
         let (seconds, steps) = stepping(scene);
         let system = System::new(backend, field, body);
-        let state = system.initial_state(model.velocity);
+        let state = system.start(&model.start);
         let warnings = std::mem::take(&mut model.warnings);
         let step = seconds / model.scale.time;
         Self {
@@ -517,6 +517,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
                 "stagnated_solutions": self.cost.stagnated,
                 "negative_curvatures": self.cost.negative_curvature,
                 "unsettled_contacts": self.cost.unsettled,
+                "residual_left_by_rounding": self.cost.left,
                 "tangents_chosen_by": tangents_by,
             },
             "contact": self.system.touch.as_ref().map(|touch| json!({ "steps_that_looked": touch.steps })),

@@ -104,11 +104,11 @@ impl<B: Backend + 'static, F: ForceField<B> + 'static> Bench<B, F> {
 
     /// As [`Bench::new`], of the scene's model.
     pub fn of(model: Model, scene: &Scene, on: impl FnOnce(&Body) -> (B, F)) -> Self {
-        let Model { body, scale, velocity, .. } = model;
+        let Model { body, scale, start, .. } = model;
         let (backend, field) = on(&body);
         let size = body.contact.as_ref().expect("an obstacle").size;
         let system = System::new(backend, field, body);
-        let state = system.initial_state(velocity);
+        let state = system.start(&start);
         let integrator = Box::new(CentralDifference::new(&system.backend));
         let h = scene.solver.step.expect("a step") / scale.time;
         Self { system, state, integrator, h, steps: scene.solver.steps(), size }
