@@ -1,5 +1,5 @@
 //! Which setting to run next: the scene's own, then one axis at a time, then what is one choice away from the front, cheap ones
-//! first.
+//! first; and how long it may take. What takes longer than most is stopped, and only run to its end when nothing cheaper is left.
 
 use crate::experiment::{Measured, Status};
 use crate::front::front;
@@ -9,17 +9,29 @@ use crate::trajectory::Metric;
 /// A mesh with twice as many cells each way takes at least so many times as long, in implicit and in explicit steps.
 const FINER: [f64; 2] = [8.0, 14.0];
 
-/// The next setting; none where all that could pay have been run.
-pub(crate) fn next(space: &Space, measured: &[Measured], metric: Metric, longest: f64) -> Option<Setting> {
+/// The part of the longest time that settings have at first.
+const AT_FIRST: f64 = 1.0 / 6.0;
+/// A setting that was stopped is run again where it may take so many times as long.
+const AGAIN: f64 = 2.0;
+
+/// The next setting, and how many seconds it may take; none where all that could pay have been run.
+pub(crate) fn next(space: &Space, measured: &[Measured], metric: Metric, longest: f64) -> Option<(Setting, f64)> {
+    let base = space.base();
+    if !measured.iter().any(|m| m.setting == base) {
+        return Some((base, longest));
+    }
+    [AT_FIRST * longest, longest].into_iter().find_map(|limit| Some((within(space, measured, metric, limit)?, limit)))
+}
+
+/// The next setting of those that may take no longer than a limit.
+fn within(space: &Space, measured: &[Measured], metric: Metric, limit: f64) -> Option<Setting> {
     let is_open = |setting: &Setting| {
+        let found = measured.iter().find(|m| m.setting == *setting);
         space.allows(setting)
-            && !measured.iter().any(|m| m.setting == *setting)
-            && predicted(space, setting, measured) <= longest
+            && found.is_none_or(|m| m.status == Status::TooSlow && AGAIN * m.wall() <= limit)
+            && predicted(space, setting, measured) <= limit
     };
     let base = space.base();
-    if is_open(&base) {
-        return Some(base);
-    }
     // The nearest choices of each axis first, an axis after the other.
     let reach = Axis::ALL.iter().map(|axis| space.choices(*axis).len()).max().unwrap_or(1);
     for distance in 1..reach {
@@ -65,8 +77,7 @@ fn predicted(space: &Space, setting: &Setting, measured: &[Measured]) -> f64 {
     let coarser = (0..mesh).filter_map(|k| {
         let coarse = setting.with(Axis::Mesh, k);
         let found = measured.iter().find(|m| m.setting == coarse)?;
-        let times = finer.powi((mesh - k) as i32);
-        Some(if found.status == Status::TooSlow { f64::INFINITY } else { found.wall() * times })
+        Some(found.wall() * finer.powi((mesh - k) as i32))
     });
     coarser.fold(0.0, f64::max)
 }

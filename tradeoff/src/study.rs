@@ -105,16 +105,19 @@ impl Study {
         let longest = budget.total.mul_f64(OF_SETTING);
         study.is_exhausted = false;
         while used() < EXPLORES && !stop.load(Ordering::SeqCst) {
-            let Some(setting) = next(space, &study.measured, budget.metric, longest.as_secs_f64()) else {
+            let found = next(space, &study.measured, budget.metric, longest.as_secs_f64());
+            let Some((setting, limit)) = found else {
                 study.is_exhausted = true;
                 break;
             };
             let left = budget.total.mul_f64((EXPLORES + 0.1 - used()).max(0.0));
             follow.does(&space.names(&setting).join(", "), used());
-            let measured = study.measure(space, setting, longest.min(left), &stop);
+            let measured = study.measure(space, setting, left.min(Duration::from_secs_f64(limit)), &stop);
             if stop.load(Ordering::SeqCst) {
                 break;
             }
+            // Of one that was stopped before only the longer time counts.
+            study.measured.retain(|m| m.setting != setting);
             study.measured.push(measured);
             write_json_atomic(&file, &serde_json::json!(study))?;
         }
