@@ -60,6 +60,11 @@ impl Moduli {
         Self { shear: deviators / 10.0, bulk: stiffness(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]) / 9.0 }
     }
 
+    /// Young's modulus in Pa.
+    pub fn young(&self) -> f64 {
+        9.0 * self.bulk * self.shear / (3.0 * self.bulk + self.shear)
+    }
+
     /// Poisson's ratio.
     pub fn poisson(&self) -> f64 {
         (3.0 * self.bulk - 2.0 * self.shear) / (2.0 * (3.0 * self.bulk + self.shear))
@@ -174,15 +179,22 @@ impl Material {
         Ok(Self::new(&subject.derivation, parameters))
     }
 
+    /// The usual material at a Poisson's ratio below a half, as near as its parameters allow.
+    ///
+    /// # Errors
+    /// See [`Material::usual`].
+    pub fn near(subject: &Subject, poisson: f64) -> Result<Self, MaterialError> {
+        Ok(Self::usual(subject)?.less_compressible(subject, ratio(poisson)))
+    }
+
     /// The usual material at the Poisson's ratios of [`POISSON`], as near as its parameters allow; each set once.
     ///
     /// # Errors
     /// See [`Material::usual`].
     pub fn all(subject: &Subject) -> Result<Vec<Self>, MaterialError> {
-        let usual = Self::usual(subject)?;
         let mut all: Vec<Self> = vec![];
         for poisson in POISSON {
-            let material = usual.less_compressible(subject, ratio(poisson));
+            let material = Self::near(subject, poisson)?;
             if !all.iter().any(|m| m.parameters == material.parameters) {
                 all.push(material);
             }

@@ -213,8 +213,11 @@ impl<B: Backend> Newton<B> {
             let floor = self.rounding(system, equation, edge);
             let stalled = norm > 0.5 * previous || iteration >= settings.newton.max_iterations;
             // Rounding excuses a residual only once it no longer falls.
-            if norm <= wanted || (stalled && norm <= 64.0 * floor) {
+            if norm <= wanted {
                 return Ok(report);
+            }
+            if stalled && norm <= 64.0 * floor {
+                return Ok(StepReport { left: norm / reference, ..report });
             }
             if iteration >= settings.newton.max_iterations {
                 return Err(not_converged(iteration, norm / reference, settings.newton.tolerance));

@@ -1,0 +1,202 @@
+//! All cells of the suite: each extreme, value and law, with each integrator, precision and device.
+
+use std::time::Duration;
+
+use rayon::prelude::*;
+use tensormass_lawbench::material::{Material, Moduli, names};
+use tensormass_lawbench::subject::Subject;
+use tensormass_runtime::device::DeviceChoice;
+use tensormass_runtime::mesh::beam;
+use tensormass_runtime::model::build;
+use tensormass_runtime::scene::{Integrator, Precision};
+use tensormass_runtime::target::Target;
+use tensormass_runtime::{LawEntry, laws};
+
+use crate::extreme::Extreme;
+use crate::reference::{Reference, unsolved};
+use crate::run::{first_line, run};
+use crate::specimen::{Fabric, Specimen, Tolerances};
+use crate::verdict::{Verdict, judge};
+
+/// The integrators, whether their steps are linearised, and their names, in the order of reports.
+pub const INTEGRATORS: [(Integrator, bool, &str); 5] = [
+    (Integrator::Static, false, "static"),
+    (Integrator::ImplicitEuler, false, "implicit Euler"),
+    (Integrator::ImplicitEuler, true, "implicit Euler, linearised"),
+    (Integrator::SemiImplicitEuler, false, "semi-implicit Euler"),
+    (Integrator::CentralDifference, false, "central differences"),
+];
+
+/// Where and in which precision a specimen is computed.
+#[derive(Debug, Clone)]
+pub struct Place {
+    /// Its name in reports.
+    pub name: &'static str,
+    /// The device.
+    pub target: Target,
+    /// The precision.
+    pub precision: Precision,
+}
+
+impl Place {
+    /// The CPU in both precisions, and a GPU if there is one.
+    pub fn all() -> Vec<Self> {
+        let mut places = vec![
+            Self { name: "f64", target: Target::Cpu, precision: Precision::F64 },
+            Self { name: "f32", target: Target::Cpu, precision: Precision::F32 },
+        ];
+        if let Ok(target) = Target::open(&DeviceChoice::Gpu, Precision::F32) {
+            places.push(Self { name: "GPU", target, precision: Precision::F32 });
+        }
+        places
+    }
+}
+
+/// One outcome.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cell {
+    /// What was driven to an extreme.
+    pub extreme: Extreme,
+    /// Which.
+    pub value: f64,
+    /// The law.
+    pub law: &'static str,
+    /// The integrator's place in [`INTEGRATORS`].
+    pub integrator: usize,
+    /// The name of the place.
+    pub place: &'static str,
+    /// What came of it.
+    pub verdict: Verdict,
+}
+
+/// Which cells.
+#[derive(Debug, Clone)]
+pub struct Choice {
+    /// The laws.
+    pub laws: Vec<&'static LawEntry>,
+    /// The extremes with their values.
+    pub questions: Vec<(Extreme, Vec<f64>)>,
+    /// Where they are computed.
+    pub places: Vec<Place>,
+    /// How long one run may take.
+    pub longest: Duration,
+}
+
+impl Choice {
+    /// All that there is.
+    pub fn all() -> Self {
+        Self {
+            laws: laws().iter().collect(),
+            questions: Extreme::ALL.into_iter().map(|e| (e, e.values())).collect(),
+            places: Place::all(),
+            longest: Duration::from_secs(120),
+        }
+    }
+
+    /// What takes a minute or two: one law of each kind, and the ends of each range.
+    pub fn short() -> Self {
+        let all = Self::all();
+        let kind = |law: &LawEntry| {
+            let info = law.info;
+            (info.structure.linear, info.domain.is_some(), info.structure.isotropic, law.damping.is_some())
+        };
+        let mut choice = Self { laws: vec![], questions: vec![], ..all };
+        for law in all.laws {
+            if !choice.laws.iter().any(|other| kind(other) == kind(law)) {
+                choice.laws.push(law);
+            }
+        }
+        for (extreme, values) in all.questions {
+            let mut ends = vec![values[0], values[values.len() / 2], values[values.len() - 1]];
+            ends.dedup();
+            // A hundred thousand steps are for the whole suite.
+            if extreme == Extreme::Drift {
+                ends = vec![2e3];
+            }
+            choice.questions.push((extreme, ends));
+        }
+        choice
+    }
+
+    /// Runs all of them; `done` is told of each law of a value.
+    pub fn run(&self, done: &(dyn Fn(&[Cell]) + Sync)) -> Vec<Cell> {
+        let mut each = vec![];
+        for (extreme, values) in &self.questions {
+            each.extend(values.iter().flat_map(|value| self.laws.iter().map(|law| (*extreme, *value, *law))));
+        }
+        let of = |(extreme, value, law): &(Extreme, f64, &'static LawEntry)| {
+            let cells = self.cells(*extreme, *value, law);
+            done(&cells);
+            cells
+        };
+        each.par_iter().flat_map_iter(of).collect()
+    }
+
+    fn cells(&self, extreme: Extreme, value: f64, law: &'static LawEntry) -> Vec<Cell> {
+        let subject = Subject::of_build(law);
+        let poisson = if extreme == Extreme::Poisson { value } else { 0.3 };
+        let integrators = INTEGRATORS.iter().enumerate().filter(|(_, (integrator, _, _))| extreme.asks(*integrator));
+        let mut cells = vec![];
+        for (k, (integrator, linearised, _)) in integrators {
+            let verdicts = match material(&subject, poisson) {
+                Ok(material) => match extreme.specimen(value, law, &material, (*integrator, *linearised)) {
+                    Ok(specimen) => self.verdicts(extreme, &specimen, &subject),
+                    Err(why) => vec![Verdict::Refused(first_line(&why)); self.places.len()],
+                },
+                Err(why) => vec![Verdict::Unjudged(why); self.places.len()],
+            };
+            let cell = |(place, verdict): (&Place, Verdict)| Cell {
+                extreme,
+                value,
+                law: law.info.name,
+                integrator: k,
+                place: place.name,
+                verdict,
+            };
+            cells.extend(self.places.iter().zip(verdicts).map(cell));
+        }
+        cells
+    }
+
+    fn verdicts(&self, extreme: Extreme, specimen: &Specimen<'_>, subject: &Subject) -> Vec<Verdict> {
+        let folder = match tempfile::tempdir() {
+            Ok(folder) => folder,
+            Err(e) => return vec![Verdict::Unjudged(e.to_string()); self.places.len()],
+        };
+        let at = (folder.path(), self.longest);
+        let reference = Reference::of(extreme, specimen, subject, at);
+        let rest = match rest(specimen, folder.path()) {
+            Ok(rest) => rest,
+            Err(why) => return vec![Verdict::Refused(first_line(&why)); self.places.len()],
+        };
+        let verdict = |place: &Place| {
+            let tolerances = Tolerances::usual(place.precision);
+            let ran = run(specimen, specimen.units, &place.target, place.precision, tolerances, at);
+            let unsolved = || unsolved(specimen, subject, specimen.units, &ran.looks, folder.path());
+            judge(&ran, &reference, &rest, (place.precision, specimen.integrator.is_explicit()), unsolved)
+        };
+        self.places.iter().map(verdict).collect()
+    }
+}
+
+/// The nodes at rest, in units of length.
+fn rest(specimen: &Specimen<'_>, folder: &std::path::Path) -> Result<Vec<[f64; 3]>, String> {
+    if specimen.fabric == Fabric::Uniform {
+        let (size, cells) = specimen.beam();
+        return Ok(beam(size, cells.map(|n| n as usize), [0.0; 3]).map_err(|e| e.to_string())?.nodes().to_vec());
+    }
+    let scene = specimen.scene(specimen.units, Precision::F64, Tolerances::TIGHT, folder).map_err(|e| e.to_string())?;
+    Ok(build(&scene).map_err(|e| e.to_string())?.mesh.nodes().to_vec())
+}
+
+/// A law's usual material at a Poisson's ratio, its fibres along x.
+fn material(subject: &Subject, poisson: f64) -> Result<Material, String> {
+    let mut material = Material::near(subject, poisson).map_err(|e| e.to_string())?;
+    for ((name, parameter), value) in names(&subject.law).iter().zip(&mut material.parameters) {
+        if parameter.direction {
+            *value = f64::from(u8::from(name.ends_with("[0]")));
+        }
+    }
+    material.moduli = Moduli::at_rest(&subject.derivation, &material.parameters);
+    Ok(material)
+}

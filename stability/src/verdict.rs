@@ -1,0 +1,123 @@
+//! What came of a specimen.
+
+use tensormass_runtime::scene::Precision;
+
+use crate::reference::Reference;
+use crate::run::{End, Look, Ran};
+
+/// What came of a specimen.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Verdict {
+    /// Right within this part of the greatest value.
+    Right(f64),
+    /// Another solution of the same equations, which are satisfied to this part of their terms: where bodies buckle there are several.
+    Other(f64),
+    /// Off by more, and the program says so.
+    Told(f64, String),
+    /// Stopped with a reason, its results kept.
+    Stopped(String),
+    /// Refused with a message.
+    Refused(String),
+    /// Stopped by the suite, for want of time.
+    Unfinished,
+    /// There is nothing to compare it with, and why.
+    Unjudged(String),
+    /// Wrong by this part, and why.
+    Wrong(f64, String),
+}
+
+/// The greatest error that counts as right: what tolerances of solvers and roundings come to.
+fn right(precision: Precision) -> f64 {
+    match precision {
+        Precision::F32 => 5e-3,
+        Precision::F64 => 1e-6,
+    }
+}
+
+/// The part of its energy that a body may lose or gain in a drift.
+fn kept(precision: Precision) -> f64 {
+    match precision {
+        Precision::F32 => 1e-2,
+        Precision::F64 => 1e-3,
+    }
+}
+
+/// Judges a run of a specimen whose nodes are at `rest`, in units of length; `unsolved` is by how much of their terms its states miss
+/// the equations of equilibrium.
+pub fn judge(
+    ran: &Ran,
+    reference: &Reference,
+    rest: &[[f64; 3]],
+    (precision, is_explicit): (Precision, bool),
+    unsolved: impl FnOnce() -> Option<f64>,
+) -> Verdict {
+    let finite = |look: &Look| look.displacement.iter().flatten().all(|x| x.is_finite());
+    if !ran.looks.iter().all(finite) {
+        return Verdict::Wrong(f64::INFINITY, "a state that is not a number".into());
+    }
+    match &ran.end {
+        End::Refused(why) => return Verdict::Refused(why.clone()),
+        End::Stopped(why) => return Verdict::Stopped(why.clone()),
+        End::Unfinished => return Verdict::Unfinished,
+        End::Done => {}
+    }
+    let limit = if matches!(reference, Reference::Energy) { kept(precision) } else { right(precision) };
+    let error = match reference {
+        Reference::Exact { stretches, reaction, energy } => exact(ran, rest, *stretches, [*reaction, *energy]),
+        Reference::Twin(looks) => apart(&ran.looks, looks),
+        Reference::Energy => drift(&ran.looks, is_explicit),
+        Reference::None(why) => {
+            return told(ran).map_or_else(|| Verdict::Unjudged(why.clone()), |t| Verdict::Told(f64::NAN, t));
+        }
+        Reference::Unsolved(off) => {
+            return Verdict::Wrong(*off, "the twin in f64 does not solve its equations".into());
+        }
+    };
+    if error <= limit {
+        return Verdict::Right(error);
+    }
+    if let (Reference::Exact { .. }, Some(off)) = (reference, unsolved())
+        && off <= limit
+    {
+        return Verdict::Other(off);
+    }
+    match told(ran) {
+        Some(warning) => Verdict::Told(error, warning),
+        None => Verdict::Wrong(error, "nothing says so".into()),
+    }
+}
+
+/// A warning that the results may be off.
+fn told(ran: &Ran) -> Option<String> {
+    ran.warnings.iter().find(|w| !w.contains("software device") && !w.contains("is a sliver")).cloned()
+}
+
+fn exact(ran: &Ran, rest: &[[f64; 3]], stretches: [f64; 3], [reaction, energy]: [f64; 2]) -> f64 {
+    let (Some(last), Some(found)) = (ran.looks.last(), ran.reaction) else { return f64::INFINITY };
+    let greatest = stretches.iter().fold(0.0_f64, |m, g| m.max(g.abs()));
+    let off = last.displacement.iter().zip(rest).flat_map(|(u, x)| (0..3).map(|i| (u[i] - stretches[i] * x[i]).abs()));
+    let off = off.fold(0.0, f64::max) / greatest;
+    off.max((found / reaction - 1.0).abs()).max((last.energy / energy - 1.0).abs())
+}
+
+/// The greatest distance of displacements, as a part of the greatest displacement.
+fn apart(found: &[Look], wanted: &[Look]) -> f64 {
+    if found.len() != wanted.len() {
+        return f64::INFINITY;
+    }
+    let (mut off, mut size) = (0.0_f64, 0.0_f64);
+    for (a, b) in found.iter().zip(wanted) {
+        for (a, b) in a.displacement.iter().flatten().zip(b.displacement.iter().flatten()) {
+            off = off.max((a - b).abs());
+            size = size.max(b.abs());
+        }
+    }
+    if off == 0.0 { 0.0 } else { off / size }
+}
+
+/// The part of its energy that a body has gained, or lost too if steps are explicit ones.
+fn drift(looks: &[Look], is_explicit: bool) -> f64 {
+    let (Some(first), Some(last)) = (looks.first(), looks.last()) else { return f64::INFINITY };
+    let gained = (last.energy - first.energy) / first.energy.abs();
+    if is_explicit { gained.abs() } else { gained.max(0.0) }
+}
