@@ -1,6 +1,8 @@
 //! St. Venant-Kirchhoff solid: Hooke's law in the Green strain, W = lambda/2 tr(E)^2 + mu E:E.
 //! Faure, Zara, Jaillet & Moreau, An Implicit Tensor-Mass Solver on the GPU for Soft Bodies Simulation, VRIPHYS 2012,
-//! eq. 10.
+//! eq. 10. It softens under compression (its stress turns at a stretch of 1/sqrt(3)): the range of stretches is the one in which
+//! a bent beam of it agrees with a neo-Hookean one within some percent.
+#[valid_stretches(0.8, 1.3)]
 #[small_strain_moduli(shear = shear_modulus(young, poisson), bulk = bulk_modulus(young, poisson))]
 struct Parameters {
     /// Young's modulus.

@@ -106,6 +106,8 @@ fn show_prints_what_json_has() {
         text(&law, "docs").lines().for_each(|line| shows(line.trim()));
         shows(law["domain"].as_str().unwrap_or("everywhere"));
         shows(law["moduli"].as_str().unwrap_or("not declared"));
+        let trusted = law["valid_stretches"].as_array();
+        shows(&trusted.map_or("not declared".to_owned(), |range| format!("{} to {}", range[0], range[1])));
         for parameter in law["parameters"].as_array().expect("an array") {
             ["name", "unit", "docs"].iter().for_each(|key| shows(text(parameter, key).trim()));
         }

@@ -259,7 +259,7 @@ fn well_known_laws() {
 
 #[test]
 fn metadata_is_kept() {
-    let text = "//! A law.\n//!\n//! Somewhere, eq. 1.\n#[domain(ln(J) * bound > -bound / 2.0)]\nstruct Parameters {\n\
+    let text = "//! A law.\n//!\n//! Somewhere, eq. 1.\n#[domain(ln(J) * bound > -bound / 2.0)]\n#[valid_stretches(0.25, 1e1)]\nstruct Parameters {\n\
                 /// A bound\n/// in two lines.\n#[unit(\"1\")] #[range(-0.5, 1e0)] #[default(0.25)] bound: f64,\n\
                 /// Stiffness.\n#[unit(\"N/m^2\")]\n#[range(1.0, 1e9)]\n#[default(1.0, 2.0)]\n#[per_element]\nc: [f64; 2],\n}\n\
                 fn energy_density(s: Strain, p: Parameters) -> f64 { p.c[0] * s.J + p.c[1] }";
@@ -275,6 +275,7 @@ fn metadata_is_kept() {
     assert_eq!(c.default, Some(vec![1.0, 2.0]));
     assert_eq!((c.unit.text.as_str(), c.unit.length, c.unit.stress, c.unit.time), ("N/m^2", 0, 1, 0));
     let domain = law.domain.as_ref().expect("the file gives one");
+    assert_eq!(law.valid_stretches, Some((0.25, 10.0)));
     assert_eq!(domain.text, "ln(J) * bound > -bound / 2.0");
     assert_eq!(scalar(&law, &domain.left), "(ln(J) * bound)");
     assert_eq!(scalar(&law, &domain.right), "(-bound / 2)");
@@ -286,6 +287,7 @@ fn a_let_is_shared() {
     let text = "//! A law.\nstruct Parameters {\n/// Stiffness.\n#[unit(\"Pa\")] #[range(1.0, 1e9)] mu: f64,\n}\n\
                 fn energy_density(s: Strain, p: Parameters) -> f64 { let x = s.J * sqrt(p.mu); x * x }";
     let law = parse("law.rs", text);
+    assert_eq!(law.valid_stretches, None);
     let ScalarNode::Mul(a, b) = &*law.energy else { panic!("a product") };
     assert!(std::rc::Rc::ptr_eq(a, b));
 }

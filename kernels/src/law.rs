@@ -126,6 +126,8 @@ pub struct LawInfo {
     pub small_strain: bool,
     /// The moduli of small strains as the law file declares them.
     pub moduli: Option<&'static str>,
+    /// The least and the greatest principal stretch for which the law's author trusts it, where the law file says so.
+    pub valid_stretches: Option<(f64, f64)>,
     /// What the law's author vouches for.
     pub accepted: &'static [Acceptance],
     /// The material's constants as expressions in the parameters, for the reader.

@@ -17,12 +17,14 @@ pub mod device;
 mod frames;
 #[cfg(feature = "gpu")]
 pub mod gpu;
+pub mod guard;
 pub mod history;
 pub mod integrate;
 pub mod mass;
 pub mod measure;
 pub mod mesh;
 pub mod model;
+pub mod moduli;
 pub mod order;
 pub mod output;
 pub mod plan;

@@ -236,12 +236,26 @@ pub trait Integrator<B: Backend, F: ForceField<B>> {
     /// # Errors
     /// The step failed; the state is then that before the step.
     fn step(&mut self, system: &mut System<B, F>, state: &mut State<B>, h: f64) -> Result<StepReport, SolveError>;
+    /// What the last solution of its last step found, if it solves anything.
+    fn solved(&self, _backend: &B) -> Option<Solved> {
+        None
+    }
     /// What it remembers from step to step besides the state.
     fn memory(&self) -> Value {
         Value::Null
     }
     /// Goes on with what another run's remembered; nothing, where that is none of its own.
     fn recall(&mut self, _memory: &Value) {}
+}
+
+/// What a solution found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solved {
+    /// The residual as the solver knows it, as a part of what had to be balanced: that of the linear solution, which is recursive,
+    /// where a step is linearised, else Newton's.
+    pub reported: f64,
+    /// By how much the step changes the velocity of each node; in equilibrium the displacement.
+    pub change: Vec<[f64; 3]>,
 }
 
 /// What a step cost.

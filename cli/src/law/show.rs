@@ -42,6 +42,7 @@ pub fn json(entry: &LawEntry) -> Value {
         "small_strain": law.small_strain,
         "dissipative": entry.damping.is_some(),
         "moduli": law.moduli,
+        "valid_stretches": law.valid_stretches.map(|(least, greatest)| [least, greatest]),
         "accepted": law.accepted.iter().map(accepted_json).collect::<Value>(),
         "parameters": law.parameters.iter().map(parameter_json).collect::<Value>(),
         "constants": law.constants,
@@ -97,11 +98,13 @@ fn page(entry: &LawEntry) -> String {
     for line in law.docs.lines() {
         page += &format!("  {}\n", line.trim());
     }
+    let trusted = law.valid_stretches.map(|(least, greatest)| format!("{least} to {greatest}"));
     let facts = [
         ["domain", law.domain.unwrap_or("everywhere")],
         ["small strain", if law.small_strain { "yes: rotation stresses it" } else { "no" }],
         ["dissipation", dissipation],
         ["small-strain moduli", law.moduli.unwrap_or("not declared")],
+        ["trusted stretches", trusted.as_deref().unwrap_or("not declared")],
         ["linear", if law.structure.linear { "yes: dP does not depend on G" } else { "no" }],
         ["isotropic", if law.structure.isotropic { "yes" } else { "no" }],
         ["uses J", if law.structure.uses_j { "yes" } else { "no" }],

@@ -39,6 +39,8 @@ pub struct Law {
     pub acceptances: Vec<Acceptance>,
     /// The moduli that the author declares: `#[small_strain_moduli(..)]`.
     pub moduli: Option<DeclaredModuli>,
+    /// The least and the greatest principal stretch for which the author trusts the law: `#[valid_stretches(..)]`.
+    pub valid_stretches: Option<(f64, f64)>,
     /// Where the energy's expressions stand in the text, each after those that it is made of.
     pub places: Vec<(Scalar, Place)>,
 }

@@ -1,4 +1,5 @@
-//! What an author claims of a law: constants at rest that the generator cannot decide, and moduli of small strains.
+//! What an author claims of a law: constants at rest that the generator cannot decide, moduli of small strains, and the
+//! stretches between which it is trusted.
 
 use proc_macro2::Span;
 use syn::punctuated::Punctuated;
@@ -9,10 +10,13 @@ use super::ast::{Acceptance, Accepted, DeclaredModuli};
 use super::dimension::PRESSURE;
 use super::error::{LawError, Place, Source};
 use super::expr::{Lowering, Scope};
+use super::metadata::numbers;
 use super::value::ScalarValue;
 
 const ACCEPT: &str = "write `#[accept(sign = \"c - d\", reason = \"..\")]`, or `cancellation`, with the constant that a \
                       refusal names";
+const STRETCHES: &str = "write `#[valid_stretches(0.8, 1.3)]`: the least and the greatest principal stretch, around the 1 of the body \
+                         at rest";
 const MODULI: &str = "write `#[small_strain_moduli(shear = mu, bulk = kappa)]`, or `lame_lambda` for `bulk`";
 
 /// The arguments of `#[small_strain_moduli(..)]`: each name, its place and its expression.
@@ -95,6 +99,21 @@ pub(super) fn moduli(source: &Source, attribute: &Attribute, errors: &mut Vec<La
     let volumetric = pairs.pop()?.2;
     let shear = pairs.pop()?.2;
     Some(Given { text, shear, volumetric, is_lambda })
+}
+
+/// The numbers of `#[valid_stretches(0.8, 1.3)]`; `None` if an error was noted.
+pub(super) fn stretches(source: &Source, attribute: &Attribute, errors: &mut Vec<LawError>) -> Option<(f64, f64)> {
+    let mut error = |span: Span, reason: String, remedy: &str| errors.push(source.error(span, reason, remedy));
+    match numbers(attribute).as_deref() {
+        Ok(&[least, greatest]) if 0.0 < least && least < 1.0 && 1.0 < greatest => return Some((least, greatest)),
+        Ok(&[least, greatest]) => {
+            let reason = format!("the stretches {least} to {greatest} are not positive and around 1");
+            error(attribute.span(), reason, STRETCHES);
+        }
+        Ok(_) => error(attribute.span(), String::from("`valid_stretches` takes two numbers"), STRETCHES),
+        Err((span, reason, remedy)) => error(*span, reason.clone(), remedy),
+    }
+    None
 }
 
 impl Lowering<'_> {

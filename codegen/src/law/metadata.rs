@@ -17,7 +17,7 @@ use super::words;
 /// Components that an array parameter may have.
 const MAX_COMPONENTS: usize = 64;
 
-const ON_STRUCT: &[&str] = &["domain", "small_strain", "small_strain_moduli", "accept"];
+const ON_STRUCT: &[&str] = &["domain", "small_strain", "small_strain_moduli", "valid_stretches", "accept"];
 const ON_FIELD: &[&str] = &["unit", "range", "default", "per_element"];
 
 /// `struct Parameters`, read.
@@ -38,6 +38,8 @@ pub(super) struct Metadata {
     pub(super) acceptances: Vec<Acceptance>,
     /// The arguments of `#[small_strain_moduli(..)]`.
     pub(super) moduli: Option<claims::Given>,
+    /// The numbers of `#[valid_stretches(..)]`.
+    pub(super) valid_stretches: Option<(f64, f64)>,
 }
 
 /// The name of a type that is a plain name.
@@ -86,6 +88,10 @@ pub(super) fn read(source: &Source, item: &ItemStruct, errors: &mut Vec<LawError
         }
         if attribute.path().is_ident("small_strain_moduli") {
             metadata.moduli = claims::moduli(source, attribute, errors);
+            continue;
+        }
+        if attribute.path().is_ident("valid_stretches") {
+            metadata.valid_stretches = claims::stretches(source, attribute, errors);
             continue;
         }
         metadata.has_domain = true;
@@ -288,7 +294,7 @@ fn length(ty: &Type) -> Result<usize, (String, &'static str)> {
 type Refusal = (Span, String, String);
 
 /// The numbers of an attribute: `range(-0.9, 1e0)`.
-fn numbers(attribute: &Attribute) -> Result<Vec<f64>, Refusal> {
+pub(super) fn numbers(attribute: &Attribute) -> Result<Vec<f64>, Refusal> {
     let arguments = attribute.parse_args_with(Punctuated::<Expr, Token![,]>::parse_terminated);
     let arguments = arguments.map_err(|_| {
         (

@@ -99,6 +99,7 @@ pub fn parse(path: &str, text: &str) -> Result<Law, Vec<LawError>> {
                 parts,
                 acceptances,
                 moduli,
+                valid_stretches: metadata.valid_stretches,
                 places,
                 dissipation,
             })

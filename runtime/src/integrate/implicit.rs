@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use crate::backend::{Backend, ForceField};
 use crate::contact::{ATTEMPTS, Attempt, Contact, Held, Holding};
 use crate::mass::Masses;
-use crate::system::{Integrator, SolveError, State, StepReport, System};
+use crate::system::{Integrator, SolveError, Solved, State, StepReport, System};
 
 use super::newton::{Equation, Newton, SolverSettings};
 
@@ -178,6 +178,10 @@ impl<B: Backend, F: ForceField<B>> Integrator<B, F> for ImplicitEuler<B> {
         // What rounding left, and what did not settle.
         system.meet_obstacles(state, h);
         Ok(report)
+    }
+
+    fn solved(&self, backend: &B) -> Option<Solved> {
+        Some(Solved { reported: self.newton.reached, change: backend.download(&self.dv) })
     }
 
     fn memory(&self) -> Value {

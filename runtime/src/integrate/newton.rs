@@ -141,6 +141,8 @@ pub(super) struct Newton<B: Backend> {
     increment: B::Vector,
     trial: B::Vector,
     u: B::Vector,
+    /// The relative residual that the last solution ended with.
+    pub reached: f64,
 }
 
 impl<B: Backend> Newton<B> {
@@ -156,6 +158,7 @@ impl<B: Backend> Newton<B> {
             increment: backend.zeros(),
             trial: backend.zeros(),
             u: backend.zeros(),
+            reached: 0.0,
         }
     }
 
@@ -190,13 +193,16 @@ impl<B: Backend> Newton<B> {
         if equation.mass == 0.0 && reference <= self.rounding(system, equation, 0.0) {
             // Nothing but the rounding of K u is out of balance: a solution would chase noise. Where there is inertia, a
             // force as small as that still accelerates the body, step after step.
+            self.reached = 0.0;
             return Ok(report);
         }
         let exact = linearised || system.body.is_linear();
         let tightest = settings.cg.tolerance;
         system.backend.copy(x, &mut self.increment);
         let first = if exact { tightest } else { tightest.max(FORCING.0) };
-        account(&mut report, self.linear(system, equation, settings, first)?);
+        let solved = self.linear(system, equation, settings, first)?;
+        self.reached = solved.residual;
+        account(&mut report, solved);
         system.backend.copy(&self.increment, x);
         if linearised {
             return Ok(report);
@@ -208,6 +214,7 @@ impl<B: Backend> Newton<B> {
             equation.residual(system, &self.u, Some(x), &mut self.damped, &mut self.residual)?;
             report.forces += 1;
             let norm = self.norm(&system.backend);
+            self.reached = if reference > 0.0 { norm / reference } else { 0.0 };
             // Textbook stresses err by a strain of one rounding unit over an element's edge.
             let edge = (system.body.volume / system.body.elements.len() as f64).cbrt();
             let floor = self.rounding(system, equation, edge);

@@ -1,7 +1,7 @@
 //! Static equilibrium: Newton's method on f(u) + loads = 0, in increments of the imposed motion and loads.
 
 use crate::backend::{Backend, ForceField};
-use crate::system::{Integrator, SolveError, State, StepReport, System};
+use crate::system::{Integrator, SolveError, Solved, State, StepReport, System};
 
 use super::newton::{Equation, Newton, SolverSettings};
 
@@ -74,5 +74,9 @@ impl<B: Backend, F: ForceField<B>> Integrator<B, F> for Statics<B> {
             system.backend.copy(&before, &mut state.u);
         }
         result
+    }
+
+    fn solved(&self, backend: &B) -> Option<Solved> {
+        Some(Solved { reported: self.newton.reached, change: backend.download(&self.du) })
     }
 }

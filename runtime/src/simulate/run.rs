@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use crate::backend::{Backend, ForceField, LeftDomain};
 use crate::frames::{FrameData, Frames};
+use crate::guard::{Guards, LastStep};
 use crate::model::Model;
 use crate::output::{OutputError, ProbeTable, create_folder, remove_file, write_json_atomic};
 use crate::plan::{Layout, Plan, integrator_name, precision_name};
@@ -37,6 +38,9 @@ pub(super) struct Run<'a, B: Backend, F: ForceField<B>> {
     steps: u64,
     cost: StepReport,
     pub(super) warnings: Vec<String>,
+    guards: Guards,
+    /// Displacement and velocity before the last step, where its residual will be looked at.
+    before_last: Option<[Vec<[f64; 3]>; 2]>,
     limits: Option<StepLimits>,
     /// Steps whose states the observer wants.
     samples: Vec<u64>,
@@ -52,9 +56,11 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         let body = model.body.clone();
         let integrator = integrator(scene, &backend, body.masses.len());
         let (seconds, steps) = stepping(scene);
+        let guards = Guards::new(&body, scene.solver.precision, steps);
         let system = System::new(backend, field, body);
         let state = system.start(&model.start);
-        let warnings = std::mem::take(&mut model.warnings);
+        let mut warnings = std::mem::take(&mut model.warnings);
+        warnings.extend(guards.before());
         let step = seconds / model.scale.time;
         Self {
             scene,
@@ -66,6 +72,8 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
             steps,
             cost: StepReport::default(),
             warnings,
+            guards,
+            before_last: None,
             limits: None,
             samples: vec![],
             watch: Watch::default(),
@@ -134,6 +142,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
                 frames.write(&self.model.mesh, time, &data)?;
             }
         }
+        self.look_back(&ending, observer);
         let summary = self.summary(&ending, &results, started.elapsed().as_secs_f64());
         if let Some(out) = out {
             write_json_atomic(&out.join("summary.json"), &summary)?;
@@ -211,6 +220,9 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         let explicit = self.scene.solver.integrator.is_explicit();
         let may_miss = self.system.touch.as_ref().is_some_and(|touch| !touch.is_looked_for);
         let before = (may_miss && !explicit).then(|| self.copies());
+        if k == self.steps && !explicit && self.scene.solver.precision == scene::Precision::F32 {
+            self.before_last = Some([&self.state.u, &self.state.v].map(|x| self.system.backend.download(x)));
+        }
         let mut stepped = self.integrator.step(&mut self.system, &mut self.state, self.step);
         if stepped.is_ok() && self.watch.missed(&mut self.system, &self.state, self.state.time, 1, self.step) {
             match before {
@@ -329,6 +341,9 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         self.limits = Some(limits);
         observer.limits(limits);
         let step = self.step * unit;
+        if self.scene.solver.integrator.is_explicit() {
+            self.guards.step(step, limits);
+        }
         if self.scene.solver.integrator.is_explicit() && step > limits.power {
             self.warnings.push(format!(
                 "the step {step:.4e} s is above the critical step {:.4e} s (power iteration): the simulation will blow up; \
@@ -372,7 +387,45 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
                 Err(e) => return Ok(Err(e)),
             }
         }
+        if self.guards.is_due(self.state.step) {
+            self.look();
+        }
         Ok(Ok(()))
+    }
+
+    /// Lets the guards look at the state.
+    fn look(&mut self) {
+        let u = self.system.backend.download(&self.state.u);
+        let time = self.state.time * self.model.scale.time;
+        self.guards.look(&self.system.body, &u, self.state.step, time);
+    }
+
+    /// Lets the guards judge the last step's residual; contact would hold what they take for out of balance.
+    fn judge_residual(&mut self) {
+        let backend = &self.system.backend;
+        let met = self.system.touch.as_ref().is_some_and(|touch| touch.is_looked_for);
+        let solved = self.integrator.solved(backend);
+        if let (Some(before), Some(solved), false) = (self.before_last.take(), solved, met) {
+            let after = backend.download(&self.state.u);
+            let (body, solver, clock) = (&self.system.body, &self.scene.solver, [self.step, self.state.time]);
+            self.guards.judge(&LastStep { body, solver, clock, before: &before, after: &after, solved });
+        }
+    }
+
+    /// Warns of what the guards saw, the last state included.
+    fn look_back(&mut self, ending: &Ending, observer: &mut (dyn Observer + Send)) {
+        if self.guards.is_due_at_end(self.state.step) {
+            self.look();
+        }
+        if *ending == Ending::Done {
+            self.judge_residual();
+        }
+        // States of a simulation that blew up say nothing of its laws.
+        if !matches!(ending, Ending::Failed(SolveError::Diverged { .. })) {
+            let found = self.guards.after();
+            found.iter().for_each(|warning| observer.warning(warning));
+            self.warnings.extend(found);
+        }
     }
 
     /// The state for an observer.
@@ -520,6 +573,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
                 "residual_left_by_rounding": self.cost.left,
                 "tangents_chosen_by": tangents_by,
             },
+            "guards": self.guards.to_json(),
             "contact": self.system.touch.as_ref().map(|touch| json!({ "steps_that_looked": touch.steps })),
             "device_counts": self.device_counts(),
             "units": { "length_m": scale.length, "stress_Pa": scale.stress, "time_s": scale.time },

@@ -151,6 +151,13 @@ fn info(law: &Law, derivation: &Derivation, reviewed: bool) -> TokenStream {
         }
         None => quote!(None),
     };
+    let valid_stretches = match law.valid_stretches {
+        Some((least, greatest)) => {
+            let [least, greatest] = [least, greatest].map(signed);
+            quote!(Some((#least, #greatest)))
+        }
+        None => quote!(None),
+    };
     let accepted = law.acceptances.iter().map(|a| {
         let (kind, constant, reason) = (a.kind.name(), &a.constant, &a.reason);
         quote!(::tensormass_kernels::Acceptance { kind: #kind, constant: #constant, reason: #reason })
@@ -179,6 +186,7 @@ fn info(law: &Law, derivation: &Derivation, reviewed: bool) -> TokenStream {
             domain: #domain,
             small_strain: #small_strain,
             moduli: #moduli,
+            valid_stretches: #valid_stretches,
             accepted: &[#(#accepted),*],
             constants: &[#(#constants),*],
             structure: Structure {

@@ -1,0 +1,158 @@
+//! The residual that an implicit step really left, in f64: a solver in f32 reports a recursive or a rounded one.
+
+use serde_json::{Value, json};
+
+use crate::backend::{Backend, ForceField};
+use crate::body::Body;
+use crate::cpu::{CpuBackend, CpuField, CpuVector};
+use crate::scene::{Integrator, Newton, Solver};
+use crate::system::{Solved, System};
+
+/// The true residual may be so many times what the solver should reach, or reports.
+const TIMES: f64 = 10.0;
+/// A reported residual above this is no excuse for the true one.
+const EXCUSED: f64 = 1e-4;
+/// Newton's method evaluates its residuals, and stops where rounding leaves no less: 10 times this is not worth a warning.
+const ROUNDED: f64 = 1e-5;
+
+/// The last step of a run, in the body's units.
+pub struct LastStep<'a> {
+    /// The body.
+    pub body: &'a Body,
+    /// How it was solved.
+    pub solver: &'a Solver,
+    /// Its length, and the time at its end.
+    pub clock: [f64; 2],
+    /// Displacement and velocity before it.
+    pub before: &'a [Vec<[f64; 3]>; 2],
+    /// The displacement after it.
+    pub after: &'a [[f64; 3]],
+    /// What its last solution found.
+    pub solved: Solved,
+}
+
+/// What was found of the last step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Residual {
+    truth: f64,
+    reported: f64,
+    tolerance: f64,
+    newton: bool,
+}
+
+impl Residual {
+    /// Computes the true residual; none where it is not known: outside a law's domain, or without any force.
+    pub(super) fn of(step: &LastStep) -> Option<Self> {
+        let Newton { tolerance, max_iterations } = step.solver.newton;
+        let newton = max_iterations > 1;
+        let tolerance = if newton { tolerance } else { step.solver.cg.tolerance };
+        let truth = relative(step, !newton)?;
+        truth.is_finite().then_some(Self { truth, reported: step.solved.reported, tolerance, newton })
+    }
+
+    fn threshold(&self) -> f64 {
+        let rounded = if self.newton { ROUNDED } else { 0.0 };
+        TIMES * self.tolerance.max(self.reported.min(EXCUSED)).max(rounded)
+    }
+
+    /// A warning with its cure.
+    pub(super) fn warning(&self) -> Option<String> {
+        let key = if self.newton { "solver.newton.tolerance" } else { "solver.cg.tolerance" };
+        (self.truth > self.threshold()).then(|| {
+            format!(
+                "the last step's true residual is {:.1e}, where the solver reports {:.1e} and {key} is {:.1e}: f32 cannot solve this any \
+                 better; take solver.precision = \"f64\", or a looser tolerance and what it costs in accuracy",
+                self.truth, self.reported, self.tolerance
+            )
+        })
+    }
+
+    /// Values and threshold.
+    pub(super) fn to_json(self) -> Value {
+        json!({
+            "true": self.truth, "reported": self.reported, "tolerance": self.tolerance, "threshold": self.threshold(),
+        })
+    }
+}
+
+/// The norm of the residual over that of the elements' and inertial forces, all in the norm of the step's diagonal.
+///
+/// Of a linearised step it is that of the linear equations at the state before it.
+fn relative(step: &LastStep, is_linearised: bool) -> Option<f64> {
+    let mut body = step.body.clone();
+    body.contact = None;
+    let backend = CpuBackend::<f64>::new(&body);
+    let field = CpuField::<f64>::new(&backend, &body);
+    let mut system = System::new(backend, field, body);
+    let [h, time] = step.clock;
+    let upload = |x: &[[f64; 3]]| system.backend.upload(x);
+    let (start, v) = (upload(&step.before[0]), upload(&step.before[1]));
+    let [mut residual, mut inner, mut inertia, mut diagonal] = std::array::from_fn(|_| system.backend.zeros());
+    if step.solver.integrator == Integrator::Static {
+        if is_linearised && !system.body.is_linear() {
+            // The linear equations were those of a state that is gone.
+            return None;
+        }
+        let end = upload(step.after);
+        system.force(&end, time, &mut residual).ok()?;
+        system.field.add_force(&system.backend, &end, &mut inner).ok()?;
+        system.field.prepare(&system.backend, &end);
+        system.field.add_diagonal(&system.backend, 1.0, &mut diagonal);
+        return Some(ratio(&system, residual, diagonal, &[&inner]));
+    }
+    let dv = upload(&step.solved.change);
+    let (alpha, beta, viscous) = (system.body.mass_damping, system.body.stiffness_damping, system.body.is_viscous());
+    let mut rate = system.backend.zeros();
+    system.backend.copy(&v, &mut rate);
+    system.backend.axpy(1.0, &dv, &mut rate);
+    let mut at = system.backend.zeros();
+    system.backend.copy(&start, &mut at);
+    if !is_linearised {
+        system.backend.axpy(h, &rate, &mut at);
+    }
+    system.force(&at, time, &mut residual).ok()?;
+    let System { backend, field, masses, .. } = &mut system;
+    field.add_force(backend, &at, &mut inner).ok()?;
+    field.prepare(backend, &at);
+    if is_linearised {
+        field.add_dforce(backend, &rate, h, &mut residual);
+        field.add_dforce(backend, &rate, h, &mut inner);
+    }
+    if viscous && is_linearised {
+        field.add_damping(backend, [&start, &v], 1.0, &mut residual);
+        field.add_ddamping(backend, [&start, &v], &dv, 1.0, &mut residual);
+    } else if viscous {
+        field.add_damping(backend, [&start, &rate], 1.0, &mut residual);
+    }
+    if beta != 0.0 {
+        field.add_dforce_at(backend, &start, &rate, beta, &mut residual);
+    }
+    masses.add(backend, -alpha, &rate, &mut residual);
+    masses.add(backend, 1.0 / h, &dv, &mut inertia);
+    backend.axpy(-1.0, &inertia, &mut residual);
+    field.add_diagonal(backend, h + beta, &mut diagonal);
+    if viscous {
+        field.add_damping_diagonal(backend, [&start, &v], 1.0, &mut diagonal);
+    }
+    backend.axpy(1.0 / h + alpha, masses.diagonal(), &mut diagonal);
+    Some(ratio(&system, residual, diagonal, &[&inner, &inertia]))
+}
+
+/// The norm of the free part of a residual over the sum of some forces' norms; 0 without forces.
+fn ratio(
+    system: &System<CpuBackend<f64>, CpuField<f64>>,
+    mut residual: CpuVector<f64>,
+    mut diagonal: CpuVector<f64>,
+    forces: &[&CpuVector<f64>],
+) -> f64 {
+    let backend = &system.backend;
+    backend.make_positive(&mut diagonal);
+    backend.project(&mut residual);
+    let mut scratch = backend.zeros();
+    let mut norm = |x: &CpuVector<f64>| {
+        backend.divide(x, &diagonal, &mut scratch);
+        backend.dot(x, &scratch).max(0.0).sqrt()
+    };
+    let all: f64 = forces.iter().map(|force| norm(force)).sum();
+    if all > 0.0 { norm(&residual) / all } else { 0.0 }
+}
