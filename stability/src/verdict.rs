@@ -30,7 +30,7 @@ pub enum Verdict {
 fn right(precision: Precision) -> f64 {
     match precision {
         Precision::F32 => 5e-3,
-        Precision::F64 => 1e-6,
+        Precision::F64 => 1e-5,
     }
 }
 

@@ -11,6 +11,8 @@ use crate::scene::Precision;
 
 /// The relative error of stresses by rounding that is worth a warning: fewer than four digits are left.
 const ROUNDING: f64 = 1e-4;
+/// Tolerances times this ratio of stiffnesses are errors of displacements that are worth a look.
+const DOUBTFUL: f64 = 1e-4;
 /// Poisson's ratio from which on linear simplices are much too stiff.
 const LOCKING: f64 = 0.45;
 
@@ -21,6 +23,8 @@ pub(super) struct AtRest {
     ratio: Option<(f64, u32)>,
     /// The largest Poisson's ratio of linear simplices, with the first element that has it and its kind.
     simplex: Option<(f64, u32, &'static ElementInfo)>,
+    /// The largest lambda + 2 mu and the least mu.
+    stiffnesses: Option<[f64; 2]>,
     /// The distance of numbers near 1.
     spacing: f64,
     precision: Option<Precision>,
@@ -58,6 +62,8 @@ impl AtRest {
             if !(ratio.is_finite() && poisson.is_finite()) {
                 continue;
             }
+            let [most, least] = self.stiffnesses.unwrap_or([0.0, f64::INFINITY]);
+            self.stiffnesses = Some([most.max(lame.lambda + 2.0 * lame.mu), least.min(lame.mu)]);
             if self.ratio.is_none_or(|(most, _)| ratio > most) {
                 self.ratio = Some((ratio, *element));
             }
@@ -66,6 +72,11 @@ impl AtRest {
                 self.simplex = Some((poisson, *element, kind));
             }
         }
+    }
+
+    /// Whether soft parts may be far from equilibrium where the residual, most of it of stiff parts, is within a tolerance.
+    pub(super) fn doubts(&self, tolerance: f64) -> bool {
+        self.stiffnesses.is_some_and(|[most, least]| tolerance.max(self.spacing) * most / least > DOUBTFUL)
     }
 
     /// The part of a stress that rounding takes: of a strain the relative rounding error is that of numbers, and lambda multiplies

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | `linear` | rotation and strain of elements whose law is linear | states |
 //! | `stretches` | principal stretches against the range for which the law's author trusts it | states |
+//! | `inverted` | elements that are inside out, of laws without a domain | states |
 //! | `rounding` | lambda/mu at rest against the precision | once |
 //! | `locking` | Poisson's ratio at rest of linear simplices | once |
 //! | `residual` | what solvers report against what is true | the last step |
@@ -14,6 +15,7 @@
 
 mod at_rest;
 mod gradient;
+mod inverted;
 mod residual;
 mod strain;
 
@@ -24,6 +26,7 @@ use crate::scene::Precision;
 use crate::step_limit::StepLimits;
 
 use at_rest::AtRest;
+use inverted::Inverted;
 pub use residual::LastStep;
 use residual::Residual;
 use strain::Strains;
@@ -36,6 +39,7 @@ const LOOKS: u64 = 64;
 pub struct Guards {
     at_rest: AtRest,
     strains: Strains,
+    inverted: Inverted,
     residual: Option<Residual>,
     steps: u64,
     /// The step that was looked at last.
@@ -48,7 +52,7 @@ impl Guards {
     /// Of a body at rest that takes so many steps in a precision.
     pub fn new(body: &Body, precision: Precision, steps: u64) -> Self {
         let (at_rest, strains) = (AtRest::of(body, precision), Strains::of(body));
-        Self { at_rest, strains, steps, ..Self::default() }
+        Self { at_rest, strains, inverted: Inverted::of(body), steps, ..Self::default() }
     }
 
     /// Warnings of what is known before the first step.
@@ -64,18 +68,29 @@ impl Guards {
     /// Whether to look at the recorded state after a step.
     pub fn is_due(&self, step: u64) -> bool {
         let part = |step: u64| (u128::from(step) * u128::from(LOOKS.min(self.steps))) / u128::from(self.steps.max(1));
-        self.strains.is_needed() && part(step) > part(self.seen)
+        self.is_needed() && part(step) > part(self.seen)
     }
 
     /// Whether the last state has yet to be looked at.
     pub fn is_due_at_end(&self, step: u64) -> bool {
-        self.strains.is_needed() && step > self.seen
+        self.is_needed() && step > self.seen
     }
 
     /// Looks at the state after a step: the displacement of each node in the body's units, at a time in s.
     pub fn look(&mut self, body: &Body, u: &[[f64; 3]], step: u64, time: f64) {
         self.strains.look(body, u, time);
+        self.inverted.look(body, u, time);
         self.seen = step;
+    }
+
+    fn is_needed(&self) -> bool {
+        self.strains.is_needed() || self.inverted.is_needed()
+    }
+
+    /// Whether an equilibrium found with this tolerance may be far from the true one, though the residual is small: stiff parts
+    /// make most of it.
+    pub fn doubts(&self, tolerance: f64) -> bool {
+        self.at_rest.doubts(tolerance)
     }
 
     /// Computes the true residual of a step in f64, which costs about as much as a few steps.
@@ -86,6 +101,7 @@ impl Guards {
     /// Warnings of what was seen.
     pub fn after(&self) -> Vec<String> {
         let mut warnings = self.strains.warnings();
+        warnings.extend(self.inverted.warning());
         warnings.extend(self.residual.as_ref().and_then(Residual::warning));
         warnings
     }
@@ -94,7 +110,7 @@ impl Guards {
     pub fn to_json(&self) -> Value {
         let ([linear, stretches], [rounding, locking]) = (self.strains.to_json(), self.at_rest.to_json());
         json!({
-            "linear": linear, "stretches": stretches, "rounding": rounding, "locking": locking,
+            "linear": linear, "stretches": stretches, "inverted": self.inverted.to_json(), "rounding": rounding, "locking": locking,
             "residual": self.residual.map(Residual::to_json),
             "step": self.step.map(|ratio| json!({ "over_critical": ratio, "threshold": 1.0 })),
         })

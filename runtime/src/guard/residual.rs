@@ -2,14 +2,19 @@
 
 use serde_json::{Value, json};
 
-use crate::backend::{Backend, ForceField};
+use crate::backend::{Backend, ForceField, Operator};
 use crate::body::Body;
+use crate::cg::{CgLimits, ConjugateGradient};
 use crate::cpu::{CpuBackend, CpuField, CpuVector};
 use crate::scene::{Integrator, Newton, Solver};
 use crate::system::{Solved, System};
 
 /// The true residual may be so many times what the solver should reach, or reports.
 const TIMES: f64 = 10.0;
+/// An error of displacements that is worth a warning.
+const ERROR: f64 = 1e-3;
+/// How far the residual falls in the solution that estimates it, and its iterations.
+const ESTIMATE: CgLimits = CgLimits { tolerance: 1e-2, max_iterations: 1000 };
 /// A reported residual above this is no excuse for the true one.
 const EXCUSED: f64 = 1e-4;
 /// Newton's method evaluates its residuals, and stops where rounding leaves no less: 10 times this is not worth a warning.
@@ -38,6 +43,8 @@ pub(super) struct Residual {
     reported: f64,
     tolerance: f64,
     newton: bool,
+    /// Of equilibrium: the greatest displacement that one more linear solution adds, as a part of the greatest.
+    error: Option<f64>,
 }
 
 impl Residual {
@@ -46,8 +53,8 @@ impl Residual {
         let Newton { tolerance, max_iterations } = step.solver.newton;
         let newton = max_iterations > 1;
         let tolerance = if newton { tolerance } else { step.solver.cg.tolerance };
-        let truth = relative(step, !newton)?;
-        truth.is_finite().then_some(Self { truth, reported: step.solved.reported, tolerance, newton })
+        let (truth, error) = relative(step, !newton)?;
+        truth.is_finite().then_some(Self { truth, reported: step.solved.reported, tolerance, newton, error })
     }
 
     fn threshold(&self) -> f64 {
@@ -57,6 +64,14 @@ impl Residual {
 
     /// A warning with its cure.
     pub(super) fn warning(&self) -> Option<String> {
+        if let Some(error) = self.error.filter(|error| *error > ERROR) {
+            return Some(format!(
+                "displacements of the equilibrium are off by about {:.1e} of the greatest, though the residual is small: stiff parts make \
+                 most of it, and soft ones are far from balance; take a smaller solver.newton.tolerance with solver.precision = \
+                 \"f64\", or parts that differ less in stiffness",
+                error
+            ));
+        }
         let key = if self.newton { "solver.newton.tolerance" } else { "solver.cg.tolerance" };
         (self.truth > self.threshold()).then(|| {
             format!(
@@ -70,15 +85,16 @@ impl Residual {
     /// Values and threshold.
     pub(super) fn to_json(self) -> Value {
         json!({
-            "true": self.truth, "reported": self.reported, "tolerance": self.tolerance, "threshold": self.threshold(),
+            "estimated_error": self.error, "true": self.truth, "reported": self.reported, "tolerance": self.tolerance, "threshold": self.threshold(),
         })
     }
 }
 
 /// The norm of the residual over that of the elements' and inertial forces, all in the norm of the step's diagonal.
 ///
-/// Of a linearised step it is that of the linear equations at the state before it.
-fn relative(step: &LastStep, is_linearised: bool) -> Option<f64> {
+/// Of a linearised step it is that of the linear equations at the state before it. With it, of equilibrium, an estimate of the error
+/// of displacements.
+fn relative(step: &LastStep, is_linearised: bool) -> Option<(f64, Option<f64>)> {
     let mut body = step.body.clone();
     body.contact = None;
     let backend = CpuBackend::<f64>::new(&body);
@@ -98,7 +114,9 @@ fn relative(step: &LastStep, is_linearised: bool) -> Option<f64> {
         system.field.add_force(&system.backend, &end, &mut inner).ok()?;
         system.field.prepare(&system.backend, &end);
         system.field.add_diagonal(&system.backend, 1.0, &mut diagonal);
-        return Some(ratio(&system, residual, diagonal, &[&inner]));
+        system.backend.make_positive(&mut diagonal);
+        let error = correction(&mut system, &end, &residual, &diagonal);
+        return Some((ratio(&system, residual, diagonal, &[&inner]), error));
     }
     let dv = upload(&step.solved.change);
     let (alpha, beta, viscous) = (system.body.mass_damping, system.body.stiffness_damping, system.body.is_viscous());
@@ -135,7 +153,28 @@ fn relative(step: &LastStep, is_linearised: bool) -> Option<f64> {
         field.add_damping_diagonal(backend, [&start, &v], 1.0, &mut diagonal);
     }
     backend.axpy(1.0 / h + alpha, masses.diagonal(), &mut diagonal);
-    Some(ratio(&system, residual, diagonal, &[&inner, &inertia]))
+    Some((ratio(&system, residual, diagonal, &[&inner, &inertia]), None))
+}
+
+/// What one more linear solution would add to a displacement at which the field is prepared, each the greatest of a component.
+fn correction(
+    system: &mut System<CpuBackend<f64>, CpuField<f64>>,
+    at: &CpuVector<f64>,
+    residual: &CpuVector<f64>,
+    diagonal: &CpuVector<f64>,
+) -> Option<f64> {
+    let mut right = system.backend.zeros();
+    system.backend.copy(residual, &mut right);
+    system.backend.project(&mut right);
+    let mut increment = system.backend.zeros();
+    let System { backend, field, masses, .. } = &mut *system;
+    let operator = Operator { masses, mass: 0.0, stiffness: 1.0, damping: None };
+    ConjugateGradient::new(backend).solve(backend, field, &operator, diagonal, &right, &mut increment, ESTIMATE);
+    let greatest = |x: &CpuVector<f64>| {
+        system.backend.download(x).as_flattened().iter().fold(0.0_f64, |most, x| most.max(x.abs()))
+    };
+    let (added, whole) = (greatest(&increment), greatest(at));
+    (whole > 0.0 && added.is_finite()).then(|| added / whole)
 }
 
 /// The norm of the free part of a residual over the sum of some forces' norms; 0 without forces.

@@ -220,7 +220,11 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         let explicit = self.scene.solver.integrator.is_explicit();
         let may_miss = self.system.touch.as_ref().is_some_and(|touch| !touch.is_looked_for);
         let before = (may_miss && !explicit).then(|| self.copies());
-        if k == self.steps && !explicit && self.scene.solver.precision == scene::Precision::F32 {
+        let solver = &self.scene.solver;
+        let is_static = solver.integrator == scene::Integrator::Static;
+        let doubtful =
+            solver.precision == scene::Precision::F32 || is_static && self.guards.doubts(solver.newton.tolerance);
+        if k == self.steps && !explicit && doubtful {
             self.before_last = Some([&self.state.u, &self.state.v].map(|x| self.system.backend.download(x)));
         }
         let mut stepped = self.integrator.step(&mut self.system, &mut self.state, self.step);
