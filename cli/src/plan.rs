@@ -3,7 +3,7 @@
 use clap::Args;
 use tensormass_runtime::device::{DeviceChoice, DeviceError};
 use tensormass_runtime::model::build;
-use tensormass_runtime::plan::{Layout, Plan, integrator_name, precision_name};
+use tensormass_runtime::plan::{Layout, Per, Plan, PlannedPass, integrator_name, precision_name};
 use tensormass_runtime::scene::Precision;
 use tensormass_runtime::target::Target;
 
@@ -62,10 +62,11 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
             .collect();
         out += &text::columns("  ", &rows);
     }
-    out += "passes of a step\n";
-    for pass in &plan.passes {
-        out += &format!("  {pass}\n");
+    for per in Per::ALL {
+        out += &passes(&plan, per);
     }
+    let [in_steps, at_most] = plan.vectors;
+    out += &format!("vectors over the nodes: {in_steps} from step to step, {at_most} at once at most\n");
     out += &format!("buffers, {:.0} bytes an element\n", plan.bytes_per_element());
     let rows: Vec<Vec<String>> =
         plan.buffers.iter().map(|(name, bytes)| vec![(*name).to_string(), format!("{bytes} bytes")]).collect();
@@ -80,6 +81,36 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
         eprintln!("warning: {warning}");
     }
     text::print(&out)
+}
+
+/// The passes that run as often, with their least operations and bytes an element; nothing where there are none.
+fn passes(plan: &Plan, per: Per) -> String {
+    let here: Vec<_> = plan.passes.iter().filter(|pass| pass.per == per).collect();
+    if here.is_empty() {
+        return String::new();
+    }
+    let often = match per {
+        Per::Step => "step",
+        Per::Solution => "linear solution",
+        Per::Iteration => "iteration of conjugate gradients",
+        Per::Record => "record",
+    };
+    let cells = |flops: Option<f64>, bytes: Option<f64>| {
+        let cell = |number: Option<f64>, unit: &str| match number {
+            Some(number) => format!("{number:.0} {unit}"),
+            None => format!("as many {unit} as the state asks for"),
+        };
+        [cell(flops, "operations"), cell(bytes, "bytes")]
+    };
+    let row = |pass: &&PlannedPass| -> Vec<String> {
+        std::iter::once(pass.name.to_string()).chain(cells(pass.flops, pass.bytes)).collect()
+    };
+    let rows: Vec<Vec<String>> = here.iter().map(row).collect();
+    let [flops, bytes] = plan.totals(per);
+    format!(
+        "passes of each {often}, {flops:.0} operations and {bytes:.0} bytes an element at the least\n{}",
+        text::columns("  ", &rows)
+    )
 }
 
 /// What a choice plans for. No device is opened but to find out what `auto` takes.

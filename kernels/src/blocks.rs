@@ -28,6 +28,11 @@ impl<R: Real + Default> States<R> {
         Self { numbers: Aligned::zeros(blocks.count() * each), each }
     }
 
+    /// Bytes of the numbers.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.numbers.all())
+    }
+
     /// Those of a cluster, followed by those of the clusters after it.
     pub fn of(&self, part: Part<R>) -> &[R] {
         &self.numbers.all()[part.span.first * self.each..]
@@ -287,6 +292,11 @@ impl<R> Blocks<R> {
     /// Nodes that vectors have which kernels are given: as many as the cluster with the most, at least.
     pub fn reach(&self) -> usize {
         self.reach
+    }
+
+    /// Bytes of places, of rest data and of constants.
+    pub fn bytes(&self) -> [usize; 3] {
+        [size_of_val(self.places.all()), size_of_val(self.rest.all()), size_of_val(self.constants.all())]
     }
 
     /// How many blocks there are.

@@ -115,6 +115,12 @@ impl<R: Real + Default> Matrix<R> {
 }
 
 impl<R> Matrix<R> {
+    /// Bytes of places, numbers and where they begin.
+    pub fn bytes(&self) -> usize {
+        let [places, numbers] = [size_of_val(self.places.all()), size_of_val(self.numbers.all())];
+        places + numbers + size_of_val(&*self.steps) + size_of_val(&*self.chunks)
+    }
+
     /// The rows of a cluster.
     pub fn rows(&self, cluster: usize) -> Rows<'_, R> {
         Rows { matrix: self, chunks: self.chunks[cluster] as usize..self.chunks[cluster + 1] as usize }

@@ -179,6 +179,7 @@ mod gpu {
             loads: vec![],
             pressures: vec![],
             contact: None,
+            moves: true,
             mass_damping: 0.0,
             stiffness_damping: 0.0,
             diameter: 1.0,

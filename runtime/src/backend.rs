@@ -10,6 +10,7 @@ use std::sync::Arc;
 use crate::body::PressedFace;
 use crate::contact::{Contact, Held, Passage};
 use crate::device::DeviceError;
+use crate::inventory::Ledger;
 use crate::mass::{MassMatrix, Masses};
 
 /// An element has left the domain of its law: the state is not one that the law describes.
@@ -169,18 +170,10 @@ pub trait Backend {
     fn descend(&self, descent: Descent<Self>, registers: &mut Self::Registers)
     where
         Self: Sized;
-    /// One update of an explicit integrator: v = keep v + kick M^-1 f, then u += drift v. What was in `acceleration` is
-    /// lost.
+    /// One update of an explicit integrator: v = keep v + kick M^-1 f, then u += drift v.
     fn advance(&self, advance: Advance<Self>)
     where
-        Self: Sized,
-    {
-        let Advance { force, masses, acceleration, keep, kick, drift, v, u } = advance;
-        self.divide(force, masses, acceleration);
-        self.scale(keep, v);
-        self.axpy(kick, acceleration, v);
-        self.axpy(drift, v, u);
-    }
+        Self: Sized;
     /// Some faces of the body for which the backend was made.
     fn pressure(&self, faces: &[PressedFace]) -> Self::Pressure;
     /// f += the forces of a pressure at displacement u.
@@ -215,6 +208,10 @@ pub trait Backend {
     fn wait(&self) -> Result<(), DeviceError>;
     /// What the device was asked to do so far.
     fn counts(&self) -> Counts;
+    /// The book of what this backend, and a field on it, hold and ran.
+    fn ledger(&self) -> &Ledger;
+    /// Lets go of memory that is kept for vectors to come.
+    fn trim(&self) {}
     /// Whether the device still works: numbers returned before a successful check are good.
     ///
     /// # Errors
@@ -228,8 +225,6 @@ pub struct Advance<'a, B: Backend> {
     pub force: &'a B::Vector,
     /// Lumped masses.
     pub masses: &'a B::Vector,
-    /// Room for accelerations.
-    pub acceleration: &'a mut B::Vector,
     /// What is kept of the velocity.
     pub keep: f64,
     /// The factor of the acceleration.
@@ -340,7 +335,9 @@ impl<B: Backend> Operator<'_, B> {
         backend.clear(d);
         field.add_diagonal(backend, self.stiffness, d);
         self.damping_diagonal(backend, field, d);
-        backend.axpy(self.mass, self.masses.diagonal(), d);
+        if let Some(masses) = self.masses.diagonal() {
+            backend.axpy(self.mass, masses, d);
+        }
     }
 }
 
@@ -385,6 +382,8 @@ pub trait ForceField<B: Backend> {
     fn add_force(&mut self, backend: &B, u: &B::Vector, f: &mut B::Vector) -> Result<(), LeftDomain>;
     /// Linearises at displacement u: the state of [`ForceField::add_dforce`] and [`ForceField::add_diagonal`].
     fn prepare(&mut self, backend: &B, u: &B::Vector);
+    /// Lets go of what products with the tangent need: whoever asks for one again has to prepare it again.
+    fn forget_tangent(&mut self, _backend: &B) {}
     /// df += factor times the force differential in the direction du, that is factor times (-K du).
     fn add_dforce(&mut self, backend: &B, du: &B::Vector, factor: f64, df: &mut B::Vector);
     /// d += factor times the diagonal of K.

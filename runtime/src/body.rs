@@ -176,6 +176,8 @@ pub struct Body {
     pub pressures: Vec<Pressure>,
     /// What its surface may touch.
     pub contact: Option<Arc<Contact>>,
+    /// Whether it has inertia and velocities: statics have neither.
+    pub moves: bool,
     /// Mass-proportional damping coefficient alpha.
     pub mass_damping: f64,
     /// Stiffness-proportional damping coefficient beta.
@@ -202,9 +204,9 @@ impl Body {
         self.batches.iter().all(|b| b.law.info.structure.linear)
     }
 
-    /// Whether a law has a dissipation.
+    /// Whether it moves and a law has a dissipation.
     pub fn is_viscous(&self) -> bool {
-        self.batches.iter().any(|b| b.law.damping.is_some())
+        self.moves && self.batches.iter().any(|b| b.law.damping.is_some())
     }
 }
 

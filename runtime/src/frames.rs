@@ -68,10 +68,7 @@ impl Frames {
 
     /// What the fields read of a state.
     pub fn needs(&self) -> Needs {
-        let stresses = self.fields.iter().any(|f| matches!(f, Field::Cauchy | Field::VonMises));
-        let energies = self.fields.contains(&Field::EnergyDensity);
-        let contact = self.fields.contains(&Field::Contact);
-        Needs { displacement: true, reactions: false, energies, stresses, contact }
+        needs(&self.fields)
     }
 
     /// Writes one frame.
@@ -108,6 +105,15 @@ impl Frames {
         self.count += 1;
         Ok(())
     }
+}
+
+/// What some fields read of a state.
+pub fn needs(fields: &[Field]) -> Needs {
+    let stresses = fields.iter().any(|f| matches!(f, Field::Cauchy | Field::VonMises));
+    let energies = fields.contains(&Field::EnergyDensity);
+    let contact = fields.contains(&Field::Contact);
+    let velocity = fields.contains(&Field::Velocity);
+    Needs { displacement: true, velocity, reactions: false, energies, stresses, contact }
 }
 
 fn frame_name(k: u32) -> String {

@@ -14,12 +14,14 @@ pub mod cg;
 pub mod contact;
 pub mod cpu;
 pub mod device;
+mod device_memory;
 mod frames;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod guard;
 pub mod history;
 pub mod integrate;
+pub mod inventory;
 pub mod mass;
 pub mod measure;
 pub mod mesh;

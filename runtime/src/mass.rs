@@ -184,26 +184,29 @@ impl Table {
     }
 }
 
-/// The masses of a body on a backend: M is diagonal, or the consistent matrix.
+/// The masses of a body on a backend: M is diagonal, or the consistent matrix; a body that does not move has none.
 pub struct Masses<B: Backend> {
-    diagonal: B::Vector,
+    diagonal: Option<B::Vector>,
     matrix: Option<B::Matrix>,
 }
 
 impl<B: Backend> Masses<B> {
     /// Lumped masses, one entry a component.
     pub fn lumped(masses: B::Vector) -> Self {
-        Self { diagonal: masses, matrix: None }
+        Self { diagonal: Some(masses), matrix: None }
     }
 
     /// The consistent matrix.
     pub fn consistent(backend: &B, matrix: &MassMatrix) -> Self {
         let diagonal: Vec<[f64; 3]> = matrix.diagonal().iter().map(|m| [*m; 3]).collect();
-        Self { diagonal: backend.upload(&diagonal), matrix: Some(backend.matrix(matrix)) }
+        Self { diagonal: Some(backend.upload(&diagonal)), matrix: Some(backend.matrix(matrix)) }
     }
 
     /// The masses of a body, with some added at nodes.
     pub fn of(backend: &B, body: &Body, added: &[(u32, f64)]) -> Self {
+        if !body.moves {
+            return Self { diagonal: None, matrix: None };
+        }
         if let Some(matrix) = &body.mass_matrix {
             return Self::consistent(backend, &matrix.clone().with_added(added));
         }
@@ -214,9 +217,17 @@ impl<B: Backend> Masses<B> {
         Self::lumped(backend.upload(&masses))
     }
 
-    /// The diagonal of M: all of it where masses are lumped.
-    pub fn diagonal(&self) -> &B::Vector {
-        &self.diagonal
+    /// The diagonal of M: all of it where masses are lumped; none in statics.
+    pub fn diagonal(&self) -> Option<&B::Vector> {
+        self.diagonal.as_ref()
+    }
+
+    /// The diagonal of M of a body that moves.
+    ///
+    /// # Panics
+    /// It does not.
+    pub fn of_motion(&self) -> &B::Vector {
+        self.diagonal.as_ref().expect("a body that moves has masses")
     }
 
     /// The matrix; none where masses are lumped.
@@ -226,9 +237,10 @@ impl<B: Backend> Masses<B> {
 
     /// y += a M x.
     pub fn add(&self, backend: &B, a: f64, x: &B::Vector, y: &mut B::Vector) {
-        match &self.matrix {
-            None => backend.multiply_add(a, &self.diagonal, x, y),
-            Some(matrix) => backend.add_product(a, matrix, x, y),
+        match (&self.matrix, &self.diagonal) {
+            (Some(matrix), _) => backend.add_product(a, matrix, x, y),
+            (None, Some(diagonal)) => backend.multiply_add(a, diagonal, x, y),
+            (None, None) => {}
         }
     }
 }

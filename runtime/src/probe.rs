@@ -30,6 +30,8 @@ impl Energies {
 pub struct Needs {
     /// The displacement of the nodes.
     pub displacement: bool,
+    /// The velocity of the nodes.
+    pub velocity: bool,
     /// Forces at the nodes.
     pub reactions: bool,
     /// Energies.
@@ -38,6 +40,20 @@ pub struct Needs {
     pub stresses: bool,
     /// Forces of contact.
     pub contact: bool,
+}
+
+impl Needs {
+    /// What either reads.
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            displacement: self.displacement || other.displacement,
+            velocity: self.velocity || other.velocity,
+            reactions: self.reactions || other.reactions,
+            energies: self.energies || other.energies,
+            stresses: self.stresses || other.stresses,
+            contact: self.contact || other.contact,
+        }
+    }
 }
 
 /// A state in SI units, with what was needed of it.

@@ -11,12 +11,30 @@ use crate::mass::Masses;
 pub struct State<B: Backend> {
     /// Displacement.
     pub u: B::Vector,
-    /// Velocity.
-    pub v: B::Vector,
+    /// Velocity; none in statics.
+    pub v: Option<B::Vector>,
     /// Time.
     pub time: f64,
     /// Steps taken.
     pub step: u64,
+}
+
+impl<B: Backend> State<B> {
+    /// The velocity of a body that moves.
+    ///
+    /// # Panics
+    /// It does not.
+    pub fn velocity(&self) -> &B::Vector {
+        self.v.as_ref().expect("a body that moves has a velocity")
+    }
+
+    /// Displacement and velocity of a body that moves.
+    ///
+    /// # Panics
+    /// It does not.
+    pub fn motion(&mut self) -> [&mut B::Vector; 2] {
+        [&mut self.u, self.v.as_mut().expect("a body that moves has a velocity")]
+    }
 }
 
 /// Why a simulation cannot go on. What was computed before stays valid.
@@ -75,12 +93,23 @@ pub struct System<B: Backend, F: ForceField<B>> {
 /// Contact of a body on a backend.
 pub struct Touch<B: Backend> {
     device: B::Contact,
-    /// Impulses on the nodes since they were last cleared, if they are wanted.
+    /// Whether impulses on the nodes are wanted.
+    pub is_recorded: bool,
+    /// Those since they were last cleared; none before something may first be met.
     pub impulse: Option<B::Vector>,
     /// Whether steps look for contact: they need not while nothing can be met.
     pub is_looked_for: bool,
     /// Steps that looked for contact.
     pub steps: u64,
+}
+
+impl<B: Backend> Touch<B> {
+    /// Makes room for impulses, if they are wanted.
+    fn begin_impulses(&mut self, backend: &B) {
+        if self.is_recorded {
+            self.impulse.get_or_insert_with(|| backend.zeros());
+        }
+    }
 }
 
 /// A body spread over this many of its diameters has diverged: no law of solids means such a stretch, and explicit
@@ -95,6 +124,7 @@ impl<B: Backend, F: ForceField<B>> System<B, F> {
         let loads = body.loads.iter().map(|l| backend.upload(&l.forces)).collect();
         let touch = body.contact.as_ref().map(|contact| Touch {
             device: backend.contact(contact),
+            is_recorded: false,
             impulse: None,
             is_looked_for: true,
             steps: 0,
@@ -112,9 +142,12 @@ impl<B: Backend, F: ForceField<B>> System<B, F> {
     pub fn start(&self, start: &Start) -> State<B> {
         let mut u = start.displacement.as_ref().map_or_else(|| self.backend.zeros(), |u| self.backend.upload(u));
         self.backend.impose(&self.body.motions_at(0.0), &mut u);
-        let uniform = || self.backend.upload(&vec![start.velocity; self.body.masses.len()]);
-        let mut v = start.velocities.as_ref().map_or_else(uniform, |v| self.backend.upload(v));
-        self.backend.project(&mut v);
+        let v = self.body.moves.then(|| {
+            let uniform = || self.backend.upload(&vec![start.velocity; self.body.masses.len()]);
+            let mut v = start.velocities.as_ref().map_or_else(uniform, |v| self.backend.upload(v));
+            self.backend.project(&mut v);
+            v
+        });
         State { u, v, time: 0.0, step: 0 }
     }
 
@@ -162,20 +195,25 @@ impl<B: Backend, F: ForceField<B>> System<B, F> {
             return;
         }
         touch.steps += 1;
+        touch.begin_impulses(&self.backend);
+        let passages = contact.passages(state.time, state.time + h);
+        let [u, v] = state.motion();
         self.backend.touch(Meeting {
             contact: &touch.device,
-            passages: &contact.passages(state.time, state.time + h),
+            passages: &passages,
             h,
-            masses: self.masses.diagonal(),
-            v: &mut state.v,
-            u: &mut state.u,
+            masses: self.masses.of_motion(),
+            v,
+            u,
             impulse: touch.impulse.as_mut(),
         });
     }
 
     /// Adds impulses to those of contact, if these are wanted.
     pub fn add_impulses(&mut self, impulses: &[[f64; 3]]) {
-        if let Some(impulse) = self.touch.as_mut().and_then(|touch| touch.impulse.as_mut()) {
+        let Some(touch) = &mut self.touch else { return };
+        touch.begin_impulses(&self.backend);
+        if let Some(impulse) = &mut touch.impulse {
             self.backend.axpy(1.0, &self.backend.upload(impulses), impulse);
         }
     }

@@ -204,7 +204,7 @@ fn patch(mesh: &Mesh, law: &'static LawEntry) {
     let start: Vec<[f64; 3]> = nodes.iter().map(|_| random.vector(0.01)).collect();
     state.u = system.backend.upload(&start);
     system.backend.impose(&system.body.motions_at(0.0), &mut state.u);
-    let mut statics = Statics::new(&system.backend, nodes.len(), settings);
+    let mut statics = Statics::new(&system.backend, settings);
     statics.step(&mut system, &mut state, 1.0).unwrap_or_else(|e| panic!("{name}: {e}"));
     let u = system.backend.download(&state.u);
     let off = u.iter().zip(nodes).flat_map(|(u, x)| (0..3).map(move |c| (u[c] - at(x)[c]).abs())).fold(0.0, f64::max);

@@ -60,7 +60,7 @@ fn check<R: Precision>(patch: &Patch, law: &'static LawEntry, tolerance: f64, pl
     let start: Vec<[f64; 3]> = nodes.iter().map(|_| random.vector(0.03)).collect();
     state.u = system.backend.upload(&start);
     system.backend.impose(&system.body.motions_at(0.0), &mut state.u);
-    let mut statics = Statics::new(&system.backend, nodes.len(), settings);
+    let mut statics = Statics::new(&system.backend, settings);
     let report = statics.step(&mut system, &mut state, 1.0).unwrap_or_else(|e| panic!("{name}: {e}"));
     let u = system.backend.download(&state.u);
     let error = (0..nodes.len()).flat_map(|n| (0..3).map(move |c| (n, c))).map(|(n, c)| (u[n][c] - moved(n)[c]).abs());

@@ -13,6 +13,8 @@ use tensormass_kernels::{Blocks, Compute, Matrix, Node, Pair, Part, block_place,
 use super::Precision;
 use super::cluster::{Cluster, Room};
 use super::vectors::CpuVector;
+use crate::inventory::names::ASSEMBLED_TANGENT;
+use crate::inventory::{Lease, Ledger};
 
 /// A block of numbers.
 type Block<R> = [R; 9];
@@ -38,6 +40,7 @@ pub(super) struct Assembled<R> {
     slots: Vec<u32>,
     /// Whether it has numbers.
     pub is_filled: bool,
+    _lease: Lease,
 }
 
 /// The pairs of nodes that the elements of a cluster join.
@@ -51,6 +54,12 @@ struct Pairs {
     foreign: usize,
     /// Those of its own that others have slots for: where their numbers begin, and the range of their slots.
     shared: Vec<(u32, Range<u32>)>,
+}
+
+impl Pairs {
+    fn bytes(&self) -> usize {
+        size_of_val(&*self.places) + size_of_val(&*self.own) + size_of_val(&*self.shared)
+    }
 }
 
 /// Two nodes by their places in the body, the lesser one first.
@@ -125,7 +134,7 @@ impl Owners {
 
 impl<R: Precision> Assembled<R> {
     /// A matrix without numbers for the clusters of a batch, on so many lanes.
-    pub fn new(clusters: &[Cluster], blocks: &Blocks<R>, lanes: usize) -> Self {
+    pub fn new(clusters: &[Cluster], blocks: &Blocks<R>, lanes: usize, ledger: &Ledger) -> Self {
         let nodes = blocks.nodes();
         let parts = || clusters.par_iter().enumerate().map(|(k, cluster)| (k, cluster, blocks.part(k)));
         let all: Vec<Vec<Key>> = parts().map(|(_, cluster, part)| keys(cluster, part, nodes, lanes)).collect();
@@ -162,7 +171,12 @@ impl<R: Precision> Assembled<R> {
             joined[owner].shared.push((at, start..slots.len() as u32));
         }
         let foreign = vec![[R::default(); 9]; foreign.iter().sum()];
-        Self { matrix, clusters: joined, foreign, slots, is_filled: false }
+        let bytes = matrix.bytes()
+            + joined.iter().map(Pairs::bytes).sum::<usize>()
+            + size_of_val(&*foreign)
+            + size_of_val(&*slots);
+        let lease = ledger.hold(ASSEMBLED_TANGENT, bytes);
+        Self { matrix, clusters: joined, foreign, slots, is_filled: false, _lease: lease }
     }
 
     /// Its numbers at displacement u.

@@ -151,12 +151,33 @@ fn four<R: Copy>(numbers: &[R], node: usize, to: &mut Node<R>) {
     }
 }
 
-/// Bytes of the places of nodes that the elements of a batch have, on the widest registers of this machine.
-pub fn place_bytes<R: Precision>(body: &Body, batch: &LawBatch) -> usize {
-    let (info, lanes) = (batch.element.info, compose::<R>(Engine::best(), batch.element, batch.law).lanes());
-    let places = |range| Arranged::new(body, batch, range, lanes).extent.places(lanes, info.nodes);
+/// Bytes that the elements of a batch take, in blocks that are filled up.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct ElementBytes {
+    /// The places of their nodes.
+    pub places: usize,
+    /// J^-1 and weights.
+    pub rest: usize,
+    /// Constants.
+    pub constants: usize,
+    /// What the law stores of the tangent, if it is asked to.
+    pub stored: usize,
+}
+
+/// Bytes that the elements of a batch take on the widest registers of this machine.
+pub fn element_bytes<R: Precision>(body: &Body, batch: &LawBatch) -> ElementBytes {
+    let (info, law) = (batch.element.info, batch.law.info);
+    let lanes = compose::<R>(Engine::best(), batch.element, batch.law).lanes();
     let ranges = clusters(info.nodes, batch.elements.len());
-    ranges.into_par_iter().map(places).sum::<usize>() * size_of::<Place>()
+    let filled: usize = ranges.iter().map(|range| range.len().next_multiple_of(lanes)).sum();
+    let places = |range| Arranged::new(body, batch, range, lanes).extent.places(lanes, info.nodes);
+    let sets = if batch.per_element { filled } else { 1 };
+    ElementBytes {
+        places: ranges.into_par_iter().map(places).sum::<usize>() * size_of::<Place>(),
+        rest: filled * info.points.len() * 10 * size_of::<R>(),
+        constants: sets * law.constants.len() * size_of::<R>(),
+        stored: filled * info.points.len() * law.stored * size_of::<R>(),
+    }
 }
 
 /// The elements of a cluster in the order of its blocks.

@@ -7,6 +7,8 @@ use super::vectors::{BLOCK, CpuVector};
 use crate::backend::Meeting;
 use crate::contact::{Approach, Contact, Move, Obstacle, Passage, SWEEPS, Surface, meets, respond};
 use crate::cpu::CpuBackend;
+use crate::inventory::names::{SURFACE, TRIANGLES};
+use crate::inventory::{Lease, Ledger};
 
 /// A node that may touch something.
 #[derive(Debug, Clone, Copy)]
@@ -29,11 +31,12 @@ pub struct CpuContact {
     /// What one convex obstacle does brings nobody into it.
     is_one_sweep_enough: bool,
     tolerance: f64,
+    _leases: [Lease; 2],
 }
 
 impl CpuContact {
     /// Contact where nodes have these places, and numbers this unit round-off.
-    pub(super) fn new(contact: &Contact, places: &[u32], epsilon: f64) -> Self {
+    pub(super) fn new(contact: &Contact, places: &[u32], epsilon: f64, ledger: &Ledger) -> Self {
         let each = contact.nodes.iter().zip(&contact.positions).zip(&contact.free);
         let mut nodes: Vec<Touching> = each
             .map(|((node, position), free)| Touching {
@@ -44,7 +47,9 @@ impl CpuContact {
             .collect();
         nodes.sort_unstable_by_key(|n| n.place);
         let obstacles = contact.obstacles.clone();
+        let triangles = obstacles.iter().map(|o| o.shape.bytes()).sum();
         Self {
+            _leases: [ledger.hold(SURFACE, size_of_val(&*nodes)), ledger.hold(TRIANGLES, triangles)],
             nodes,
             is_one_sweep_enough: matches!(&obstacles[..], [one] if one.shape.approach() == Approach::Tangents),
             obstacles,

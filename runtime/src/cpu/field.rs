@@ -9,48 +9,34 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
-use tensormass_kernels::{Blocks, Compute, Engine, Extent, LawInfo, Node, Part, States, compose};
+use tensormass_kernels::{Blocks, Compute, Engine, Extent, LawInfo, Node, Part, compose};
 
-use super::assembled::Assembled;
 use super::cluster::{Arranged, Cluster, Room, Vectors};
+use super::products::Products;
 use super::vectors::{BLOCK, CpuVector, exact_dot};
 use super::{CpuBackend, Precision};
 use crate::backend::{Backend, ForceField, LeftDomain, Operator, REGISTERS, RUNNING, SUM};
 use crate::body::{Body, LawBatch};
+use crate::inventory::names::{CONSTANTS, ELEMENT_NODES, ELEMENT_NUMBERS, PARTIAL_FORCES, REST, SLOTS};
+use crate::inventory::{Lease, Ledger};
 use crate::mesh::Incidence;
 use crate::order::clusters;
 use crate::tangent::{self, Tangent};
 
 /// The elements of one law and kind.
-struct CpuBatch<R: Precision> {
-    law: &'static LawInfo,
-    compute: Box<dyn Compute<R>>,
-    clusters: Vec<Cluster>,
-    blocks: Blocks<R>,
+pub(super) struct CpuBatch<R: Precision> {
+    pub law: &'static LawInfo,
+    pub compute: Box<dyn Compute<R>>,
+    pub clusters: Vec<Cluster>,
+    pub blocks: Blocks<R>,
     /// Products with the tangent.
-    products: Products<R>,
-}
-
-/// How products with the tangent are computed, with what they need of a state; none before they are asked for.
-enum Products<R> {
-    Stored(Option<States<R>>),
-    Recomputed,
-    Assembled(Option<Assembled<R>>),
-}
-
-impl<R> From<Tangent> for Products<R> {
-    fn from(tangent: Tangent) -> Self {
-        match tangent {
-            Tangent::Stored => Self::Stored(None),
-            Tangent::Recomputed => Self::Recomputed,
-            Tangent::Assembled => Self::Assembled(None),
-        }
-    }
+    pub products: Products<R>,
+    _leases: [Lease; 3],
 }
 
 impl<R: Precision> CpuBatch<R> {
     /// A batch whose first nodes, so many, are those of batches before it.
-    fn new(body: &Body, batch: &LawBatch, places: &[u32], met: &mut usize, engine: Engine) -> Self {
+    fn new(body: &Body, batch: &LawBatch, backend: &CpuBackend<R>, met: &mut usize, engine: Engine) -> Self {
         let info = batch.element.info;
         let compute = compose::<R>(engine, batch.element, batch.law);
         let ranges = clusters(info.nodes, batch.elements.len());
@@ -60,30 +46,14 @@ impl<R: Precision> CpuBatch<R> {
         let shape = [info.nodes, info.points.len(), batch.law.info.constants.len()];
         let mut blocks = Blocks::new(compute.lanes(), shape, batch.per_element, &extents);
         let cluster = |(number, arranged)| {
-            let cluster = Cluster::new((body, batch, places), arranged, *met, (&mut blocks, number));
+            let cluster = Cluster::new((body, batch, backend.places()), arranged, *met, (&mut blocks, number));
             *met = cluster.own.end;
             cluster
         };
-        Self {
-            law: batch.law.info,
-            clusters: arranged.iter().enumerate().map(cluster).collect(),
-            blocks,
-            compute,
-            products: Products::Stored(None),
-        }
-    }
-
-    /// What a cluster adds to a product from what is stored of the state.
-    fn multiply(&self, cluster: usize, du: &[Node<R>], out: &mut [Node<R>]) -> Option<usize> {
-        match &self.products {
-            Products::Stored(Some(states)) => {
-                let part = self.blocks.part(cluster);
-                self.compute.apply(part, states.of(part), du, out);
-            }
-            Products::Assembled(Some(matrix)) => matrix.multiply(&*self.compute, cluster, du, out),
-            _ => unreachable!("the tangent is linearized"),
-        }
-        None
+        let clusters = arranged.iter().enumerate().map(cluster).collect();
+        let (names, bytes) = ([ELEMENT_NODES, REST, CONSTANTS], blocks.bytes());
+        let leases = std::array::from_fn(|k| backend.ledger().hold(names[k], bytes[k]));
+        Self { law: batch.law.info, clusters, blocks, compute, products: Products::Stored(None), _leases: leases }
     }
 
     fn left(&self, element: u32) -> LeftDomain {
@@ -94,7 +64,7 @@ impl<R: Precision> CpuBatch<R> {
 
 /// All elements of a body.
 pub struct CpuField<R: Precision> {
-    batches: Vec<CpuBatch<R>>,
+    pub(super) batches: Vec<CpuBatch<R>>,
     /// Of each node the partial force of the cluster that it belongs to.
     own: Vec<[R; 3]>,
     /// A partial force for each node that is foreign to a cluster, cluster after cluster.
@@ -105,10 +75,12 @@ pub struct CpuField<R: Precision> {
     slots: Vec<u32>,
     /// How many elements there are.
     elements: usize,
-    /// The displacement at which the tangent is taken.
-    state: CpuVector<R>,
+    /// The displacement at which the tangent is taken; none where no law's tangent depends on it, or none was prepared.
+    pub(super) state: Option<CpuVector<R>>,
     /// Whether what is stored of it is there.
-    is_linearized: bool,
+    pub(super) is_linearized: bool,
+    pub(super) ledger: Ledger,
+    _leases: [Lease; 3],
 }
 
 impl<R: Precision> CpuField<R> {
@@ -120,22 +92,37 @@ impl<R: Precision> CpuField<R> {
     /// The elements of a body, in clusters.
     pub fn on(backend: &CpuBackend<R>, body: &Body, engine: Engine) -> Self {
         let mut met = 0;
-        let batch = |b| CpuBatch::new(body, b, backend.places(), &mut met, engine);
+        let batch = |b| CpuBatch::new(body, b, backend, &mut met, engine);
         let batches: Vec<CpuBatch<R>> = body.batches.iter().map(batch).collect();
         let clusters = batches.iter().flat_map(|b| &b.clusters);
         let foreign = clusters.flat_map(|c| &c.foreign).map(|n| *n as usize);
         let nodes = body.masses.len();
         let incidence = Incidence::of_slots(nodes, foreign);
         let ranges = incidence.offsets().windows(2).zip(0..).map(|(ends, node)| (node, ends[0]..ends[1]));
+        let own = vec![[R::default(); 3]; nodes];
+        let foreign = vec![[R::default(); 3]; incidence.slots().len()];
+        let shared: Vec<(u32, Range<u32>)> = ranges.filter(|(_, slots)| !slots.is_empty()).collect();
+        let slots = incidence.slots().to_vec();
+        let ledger = backend.ledger();
+        let all = || batches.iter().flat_map(|b| &b.clusters);
+        let numbers = all().map(|c| size_of_val(&*c.elements)).sum();
+        let of_clusters = all().map(|c| size_of_val(&*c.foreign)).sum::<usize>();
+        let leases = [
+            ledger.hold(PARTIAL_FORCES, size_of_val(&*own) + size_of_val(&*foreign)),
+            ledger.hold(SLOTS, size_of_val(&*shared) + size_of_val(&*slots) + of_clusters),
+            ledger.hold(ELEMENT_NUMBERS, numbers),
+        ];
         let field = Self {
-            own: vec![[R::default(); 3]; nodes],
-            foreign: vec![[R::default(); 3]; incidence.slots().len()],
-            shared: ranges.filter(|(_, slots)| !slots.is_empty()).collect(),
-            slots: incidence.slots().to_vec(),
+            own,
+            foreign,
+            shared,
+            slots,
             elements: body.elements.len(),
-            batches,
-            state: backend.zeros(),
+            state: None,
             is_linearized: false,
+            ledger: ledger.clone(),
+            _leases: leases,
+            batches,
         };
         field.with_tangents(&tangent::by_rule(body, size_of::<R>()))
     }
@@ -150,13 +137,15 @@ impl<R: Precision> CpuField<R> {
     /// Pass 1: a kernel of every cluster, which adds to vectors of zeros.
     fn elements<const N: usize>(
         &mut self,
+        name: &str,
         vectors: [&CpuVector<R>; N],
         kernel: impl Fn(&dyn Compute<R>, Part<R>, Vectors<R, N>, &mut [Node<R>]) -> Option<usize> + Sync,
     ) -> Result<(), LeftDomain> {
+        self.ledger.ran(name);
         self.pass(vectors, |batch, k, vectors, out| kernel(&*batch.compute, batch.blocks.part(k), vectors, out))
     }
 
-    fn pass<const N: usize>(
+    pub(super) fn pass<const N: usize>(
         &mut self,
         vectors: [&CpuVector<R>; N],
         kernel: impl Fn(&CpuBatch<R>, usize, Vectors<R, N>, &mut [Node<R>]) -> Option<usize> + Sync,
@@ -190,85 +179,29 @@ impl<R: Precision> CpuField<R> {
     }
 
     /// Pass 1 of what reports no domain.
-    fn everywhere<const N: usize>(
+    pub(super) fn everywhere<const N: usize>(
         &mut self,
+        name: &str,
         vectors: [&CpuVector<R>; N],
         kernel: impl Fn(&dyn Compute<R>, Part<R>, Vectors<R, N>, &mut [Node<R>]) + Sync,
     ) {
-        let done = self.elements(vectors, |compute, part, vectors, out| {
+        let done = self.elements(name, vectors, |compute, part, vectors, out| {
             kernel(compute, part, vectors, out);
             None
         });
         debug_assert!(done.is_ok(), "differentials and damping report no domain");
     }
 
-    /// Stores what products with the tangent need of the state.
-    fn linearize(&mut self) {
-        let u = &self.state;
-        for CpuBatch { law, compute, clusters, blocks, products, .. } in &mut self.batches {
-            let (compute, clusters, blocks) = (&**compute, &*clusters, &*blocks);
-            match products {
-                Products::Stored(states) => {
-                    let states = states.get_or_insert_with(|| compute.states(blocks));
-                    states.parts_mut(blocks).into_par_iter().enumerate().for_each_init(
-                        Room::new,
-                        |room, (k, states)| {
-                            let [u] = room.copies(blocks, &clusters[k], [u]);
-                            compute.linearize(blocks.part(k), u, states);
-                        },
-                    );
-                }
-                Products::Recomputed => {}
-                Products::Assembled(matrix) => {
-                    let matrix = matrix.get_or_insert_with(|| Assembled::new(clusters, blocks, compute.lanes()));
-                    // The tangent of a linear law is the same everywhere.
-                    if !(law.structure.linear && matrix.is_filled) {
-                        matrix.fill(compute, blocks, clusters, u);
-                    }
-                }
-            }
-        }
-        self.is_linearized = true;
-    }
-
-    /// Pass 1 of a product with the tangent at the prepared state: that of rest, if none was.
-    fn apply(&mut self, du: &CpuVector<R>) {
-        if !self.is_linearized {
-            self.linearize();
-        }
-        let recomputes = self.batches.iter().any(|b| matches!(b.products, Products::Recomputed));
-        let done = if recomputes {
-            self.at_state(|field, u| {
-                field.pass([u, du], |batch, k, [u, du], out| match batch.products {
-                    Products::Recomputed => {
-                        batch.compute.dforce(batch.blocks.part(k), [u, du], out);
-                        None
-                    }
-                    _ => batch.multiply(k, du, out),
-                })
-            })
-        } else {
-            self.pass([du], |batch, k, [du], out| batch.multiply(k, du, out))
-        };
-        debug_assert!(done.is_ok(), "differentials report no domain");
-    }
-
-    /// What is computed at the displacement at which the tangent is taken.
-    fn at_state<T>(&mut self, compute: impl FnOnce(&mut Self, &CpuVector<R>) -> T) -> T {
-        let state = std::mem::replace(&mut self.state, CpuVector(vec![]));
-        let result = compute(self, &state);
-        self.state = state;
-        result
-    }
-
     /// What a kernel gives each element, by the mesh's numbers.
     fn each<T: Copy + Send + Sync, U: Clone>(
         &self,
+        name: &str,
         u: &CpuVector<R>,
         zero: T,
         kernel: impl Fn(&dyn Compute<R>, Part<R>, &[Node<R>], &mut [T]) -> Option<usize> + Sync,
         convert: impl Fn(T) -> U,
     ) -> Result<Vec<U>, LeftDomain> {
+        self.ledger.ran(name);
         let mut all = vec![convert(zero); self.elements];
         let mut outside: Option<(u32, &CpuBatch<R>)> = None;
         for batch in &self.batches {
@@ -311,7 +244,7 @@ impl<R: Precision> CpuField<R> {
     }
 
     /// y += factor times the sum of each node's partial forces.
-    fn nodes(&mut self, factor: R, y: &mut CpuVector<R>) {
+    pub(super) fn nodes(&mut self, factor: R, y: &mut CpuVector<R>) {
         self.sums().zip(y.0.par_chunks_mut(BLOCK)).for_each(|((_, sums), y)| {
             for (y, sum) in y.as_flattened_mut().iter_mut().zip(sums.as_flattened()) {
                 *y = *y + factor * *sum;
@@ -325,11 +258,12 @@ impl<R: Precision> CpuField<R> {
         &mut self,
         backend: &CpuBackend<R>,
         [factor, mass]: [R; 2],
-        masses: &CpuVector<R>,
+        masses: Option<&CpuVector<R>>,
         x: &CpuVector<R>,
         y: &mut CpuVector<R>,
     ) -> f64 {
-        let given = x.0.par_chunks(BLOCK).zip(masses.0.par_chunks(BLOCK));
+        // Without masses their factor is 0, and x as good as any.
+        let given = x.0.par_chunks(BLOCK).zip(masses.unwrap_or(x).0.par_chunks(BLOCK));
         let blocks: Vec<f64> = self
             .sums()
             .zip(y.0.par_chunks_mut(BLOCK).zip(given))
@@ -348,7 +282,7 @@ impl<R: Precision> CpuField<R> {
 
 impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
     fn element_energies(&mut self, _: &CpuBackend<R>, u: &CpuVector<R>) -> Result<Vec<f64>, LeftDomain> {
-        self.each(u, R::default(), |compute, part, u, out| compute.energy(part, u, out), R::to_f64)
+        self.each("energy", u, R::default(), |compute, part, u, out| compute.energy(part, u, out), R::to_f64)
     }
 
     fn cauchy(&mut self, _: &CpuBackend<R>, u: &CpuVector<R>) -> Vec<[f64; 9]> {
@@ -357,18 +291,21 @@ impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
             None
         };
         // The kernel cannot fail: outside the domain its values are not used.
-        self.each(u, [R::default(); 9], stress, |s| s.map(R::to_f64)).unwrap_or_default()
+        self.each("cauchy", u, [R::default(); 9], stress, |s| s.map(R::to_f64)).unwrap_or_default()
     }
 
     fn add_force(&mut self, _: &CpuBackend<R>, u: &CpuVector<R>, f: &mut CpuVector<R>) -> Result<(), LeftDomain> {
-        self.elements([u], |compute, part, [u], out| compute.force(part, u, out))?;
+        self.elements("force", [u], |compute, part, [u], out| compute.force(part, u, out))?;
         self.nodes(R::from_f64(1.0), f);
         Ok(())
     }
 
     fn prepare(&mut self, backend: &CpuBackend<R>, u: &CpuVector<R>) {
-        backend.copy(u, &mut self.state);
-        self.linearize();
+        self.take_tangent_at(backend, u);
+    }
+
+    fn forget_tangent(&mut self, _: &CpuBackend<R>) {
+        self.forget();
     }
 
     fn add_dforce(&mut self, _: &CpuBackend<R>, du: &CpuVector<R>, factor: f64, df: &mut CpuVector<R>) {
@@ -377,7 +314,18 @@ impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
     }
 
     fn add_diagonal(&mut self, backend: &CpuBackend<R>, factor: f64, d: &mut CpuVector<R>) {
-        self.at_state(|field, u| field.add_diagonal_at(backend, u, factor, d));
+        match self.state.take() {
+            Some(state) => {
+                self.add_diagonal_at(backend, &state, factor, d);
+                self.state = Some(state);
+            }
+            // Of rest; linear laws, whose diagonal depends on nothing, take what is there.
+            None if self.depends_on_state() => self.add_diagonal_at(backend, &backend.zeros(), factor, d),
+            None => {
+                self.everywhere("diagonal", [&*d], |compute, part, [u], out| compute.diagonal(part, u, out));
+                self.nodes(R::from_f64(factor), d);
+            }
+        }
     }
 
     fn add_dforce_at(
@@ -388,17 +336,22 @@ impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
         factor: f64,
         df: &mut CpuVector<R>,
     ) {
-        self.everywhere([u, du], |compute, part, u_du, out| compute.dforce(part, u_du, out));
+        if self.depends_on_state() {
+            self.everywhere("dforce", [u, du], |compute, part, u_du, out| compute.dforce(part, u_du, out));
+        } else {
+            // A constant tangent is all that there is to know: G is not gathered.
+            self.everywhere("apply", [du], |compute, part, [du], out| compute.apply(part, &[], du, out));
+        }
         self.nodes(R::from_f64(factor), df);
     }
 
     fn add_diagonal_at(&mut self, _: &CpuBackend<R>, u: &CpuVector<R>, factor: f64, d: &mut CpuVector<R>) {
-        self.everywhere([u], |compute, part, [u], out| compute.diagonal(part, u, out));
+        self.everywhere("diagonal", [u], |compute, part, [u], out| compute.diagonal(part, u, out));
         self.nodes(R::from_f64(factor), d);
     }
 
     fn add_damping(&mut self, _: &CpuBackend<R>, [u, v]: [&CpuVector<R>; 2], factor: f64, f: &mut CpuVector<R>) {
-        self.everywhere([u, v], |compute, part, u_v, out| compute.damping(part, u_v, out));
+        self.everywhere("damping", [u, v], |compute, part, u_v, out| compute.damping(part, u_v, out));
         self.nodes(R::from_f64(factor), f);
     }
 
@@ -410,7 +363,7 @@ impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
         factor: f64,
         df: &mut CpuVector<R>,
     ) {
-        self.everywhere([u, v, dv], |compute, part, u_v_dv, out| compute.ddamping(part, u_v_dv, out));
+        self.everywhere("ddamping", [u, v, dv], |compute, part, u_v_dv, out| compute.ddamping(part, u_v_dv, out));
         self.nodes(R::from_f64(factor), df);
     }
 
@@ -421,7 +374,7 @@ impl<R: Precision> ForceField<CpuBackend<R>> for CpuField<R> {
         factor: f64,
         d: &mut CpuVector<R>,
     ) {
-        self.everywhere([u, v], |compute, part, u_v, out| compute.damping_diagonal(part, u_v, out));
+        self.everywhere("damping_diagonal", [u, v], |compute, part, u_v, out| compute.damping_diagonal(part, u_v, out));
         self.nodes(R::from_f64(factor), d);
     }
 

@@ -6,14 +6,15 @@ mod contact;
 mod field;
 mod one;
 mod pressure;
+mod products;
 mod tune;
 mod vectors;
 
-pub use cluster::place_bytes;
+pub use cluster::{ElementBytes, element_bytes};
 pub use contact::{CpuContact, TOUCHING_BYTES};
 pub use field::CpuField;
 pub use one::One;
-pub use pressure::CpuPressure;
+pub use pressure::{CpuPressure, pressed_bytes};
 pub use tensormass_kernels::Engine;
 pub use tune::fastest;
 pub use vectors::{CpuBackend, CpuVector};

@@ -9,6 +9,8 @@ use crate::backend::{ALPHA, Advance, BETA, Backend, Counts, Descent, Meeting, RE
 use crate::body::{Body, Constraint, PressedFace};
 use crate::contact::{Contact, Held, Passage};
 use crate::device::DeviceError;
+use crate::inventory::names::{CONSTRAINED, MASS_MATRIX, PLACES, VECTORS};
+use crate::inventory::{Lease, Ledger};
 use crate::mass::MassMatrix;
 use crate::order::{node_places, placed_constraints};
 
@@ -36,11 +38,27 @@ pub struct CpuMatrix<R> {
     offsets: Vec<u32>,
     columns: Vec<u32>,
     values: Vec<R>,
+    _lease: Lease,
 }
 
 /// A vector in memory, in the backend's order of nodes.
-#[derive(Debug, Clone)]
-pub struct CpuVector<R>(pub(super) Vec<[R; 3]>);
+#[derive(Debug)]
+pub struct CpuVector<R>(pub(super) Vec<[R; 3]>, Lease);
+
+impl<R: Precision> CpuVector<R> {
+    /// Zeros at so many nodes.
+    pub(super) fn zeros(nodes: usize, ledger: &Ledger) -> Self {
+        let numbers = vec![[R::default(); 3]; nodes];
+        let lease = ledger.hold(VECTORS, size_of_val(&*numbers));
+        Self(numbers, lease)
+    }
+}
+
+impl<R: Clone> Clone for CpuVector<R> {
+    fn clone(&self) -> Self {
+        Self(self.0.clone(), self.1.clone())
+    }
+}
 
 /// Vectors in memory. Nodes are ordered as the clusters of the body meet them, so that those of a cluster are together.
 #[derive(Debug)]
@@ -51,6 +69,8 @@ pub struct CpuBackend<R> {
     constraints: Vec<Constraint>,
     /// Nodes on obstacles: their places and normals, and whether they stick.
     held: Vec<(usize, [f64; 3], bool)>,
+    ledger: Ledger,
+    _leases: [Lease; 2],
     precision: std::marker::PhantomData<R>,
 }
 
@@ -59,7 +79,9 @@ impl<R: Precision> CpuBackend<R> {
     pub fn new(body: &Body) -> Self {
         let places = node_places(body);
         let constraints = placed_constraints(body, &places);
-        Self { places, constraints, held: vec![], precision: std::marker::PhantomData }
+        let ledger = Ledger::default();
+        let leases = [ledger.hold(PLACES, size_of_val(&*places)), ledger.hold(CONSTRAINED, size_of_val(&*constraints))];
+        Self { places, constraints, held: vec![], ledger, _leases: leases, precision: std::marker::PhantomData }
     }
 
     /// Where each node of the body is in a vector.
@@ -93,7 +115,7 @@ impl<R: Precision> Backend for CpuBackend<R> {
     type Pressure = CpuPressure;
 
     fn zeros(&self) -> Self::Vector {
-        CpuVector(vec![[R::default(); 3]; self.places.len()])
+        CpuVector::zeros(self.places.len(), &self.ledger)
     }
 
     fn upload(&self, values: &[[f64; 3]]) -> Self::Vector {
@@ -140,11 +162,14 @@ impl<R: Precision> Backend for CpuBackend<R> {
 
     fn matrix(&self, matrix: &MassMatrix) -> CpuMatrix<R> {
         let MassMatrix { offsets, columns, values } = matrix.placed(&self.places);
-        CpuMatrix { offsets, columns, values: values.into_iter().map(R::from_f64).collect() }
+        let values: Vec<R> = values.into_iter().map(R::from_f64).collect();
+        let bytes = size_of_val(&*offsets) + size_of_val(&*columns) + size_of_val(&*values);
+        CpuMatrix { offsets, columns, values, _lease: self.ledger.hold(MASS_MATRIX, bytes) }
     }
 
     fn add_product(&self, a: f64, matrix: &CpuMatrix<R>, x: &Self::Vector, y: &mut Self::Vector) {
         let a = R::from_f64(a);
+        self.ledger.ran("product with the consistent mass");
         y.0.par_chunks_mut(BLOCK).enumerate().for_each(|(block, y)| {
             for (i, y) in y.iter_mut().enumerate() {
                 let node = block * BLOCK + i;
@@ -291,7 +316,7 @@ impl<R: Precision> Backend for CpuBackend<R> {
     }
 
     fn advance(&self, advance: Advance<Self>) {
-        let Advance { force, masses, keep, kick, drift, v, u, .. } = advance;
+        let Advance { force, masses, keep, kick, drift, v, u } = advance;
         let [keep, kick, drift] = [keep, kick, drift].map(R::from_f64);
         let given = force.0.par_chunks(BLOCK).zip(masses.0.par_chunks(BLOCK));
         // One pass over the vectors, with the arithmetic of the four operations.
@@ -306,22 +331,25 @@ impl<R: Precision> Backend for CpuBackend<R> {
     }
 
     fn pressure(&self, faces: &[PressedFace]) -> CpuPressure {
-        CpuPressure::new(faces, &self.places)
+        CpuPressure::new(faces, &self.places, &self.ledger)
     }
 
     fn add_pressure(&self, faces: &CpuPressure, pressure: f64, u: &Self::Vector, f: &mut Self::Vector) {
+        self.ledger.ran("pressure");
         faces.add(pressure, u, f);
     }
 
     fn contact(&self, contact: &Contact) -> CpuContact {
-        CpuContact::new(contact, &self.places, R::EPSILON)
+        CpuContact::new(contact, &self.places, R::EPSILON, &self.ledger)
     }
 
     fn touch(&self, meeting: Meeting<Self>) {
+        self.ledger.ran("contact");
         meeting.contact.touch(meeting);
     }
 
     fn gap(&self, contact: &CpuContact, passages: &[Passage<f64>], limit: f64, u: &Self::Vector) -> f64 {
+        self.ledger.ran("gap");
         contact.gap(passages, u).min(limit)
     }
 
@@ -345,6 +373,10 @@ impl<R: Precision> Backend for CpuBackend<R> {
 
     fn counts(&self) -> Counts {
         Counts::default()
+    }
+
+    fn ledger(&self) -> &Ledger {
+        &self.ledger
     }
 
     fn check(&self) -> Result<(), DeviceError> {

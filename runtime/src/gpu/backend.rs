@@ -7,10 +7,13 @@ use std::collections::HashMap;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use crate::backend::{Backend, Counts, Descent, Meeting, REGISTERS, RUNNING, Update};
+use crate::backend::{Advance, Backend, Counts, Descent, Meeting, REGISTERS, RUNNING, Update};
 use crate::body::{Body, Constraint, PressedFace};
-use crate::contact::{Contact, Held, NUMBERS, Passage};
+use crate::contact::{Contact, Held, Passage};
 use crate::device::DeviceError;
+use crate::device_memory::{GROUP, WORK_GROUP, motions, partial_sums};
+use crate::inventory::Ledger;
+use crate::inventory::names::{CONSTRAINED, HELD, MASS_MATRIX, PARTIALS, REGISTERS as REGISTERS_HELD, VECTORS};
 use crate::mass::MassMatrix;
 use crate::order::{DeviceOrder, placed_constraints};
 
@@ -18,7 +21,7 @@ use super::contact::GpuContact;
 use super::device::Gpu;
 use super::pressure::GpuPressure;
 use super::recorder::{Kernel, Memory, Numbers, Recorder};
-use super::shaders::{Access, Argument, GROUP, Operation, update_arguments, update_text};
+use super::shaders::{Access, Argument, Operation, update_arguments, update_text};
 use super::trace;
 
 /// No motion: a component that is not constrained.
@@ -44,7 +47,7 @@ pub struct GpuOptions {
 impl Default for GpuOptions {
     fn default() -> Self {
         Self {
-            work_group_size: 64,
+            work_group_size: WORK_GROUP,
             elements_per_invocation: 1,
             iterations_per_submission: 32,
             steps_between_checks: 32,
@@ -114,13 +117,15 @@ pub struct GpuBackend {
     /// The zero vector, with the constraint masks.
     origin: Memory,
     masks: Vec<f32>,
-    /// Constrained nodes and the motions of their components.
-    constrained: Memory,
+    /// Constrained nodes and the motions of their components, if there are any.
+    constrained: Option<Memory>,
     constrained_nodes: usize,
     motions: usize,
-    /// Nodes on obstacles, of which so many are held now.
-    held: Memory,
+    /// Nodes on obstacles, of which so many are held now: made when some first are.
+    held: Option<Memory>,
     held_nodes: usize,
+    /// Nodes that may be held.
+    surface: usize,
     partials: Memory,
     gate: Rc<Memory>,
     /// Partial sums that the next update adds up.
@@ -137,28 +142,26 @@ impl GpuBackend {
     /// A vector over the body's nodes or its mass matrix is larger than the device can bind, or the device has failed.
     pub fn new(gpu: Arc<Gpu>, body: &Body, options: GpuOptions) -> Result<Self, DeviceError> {
         let options = options.valid();
-        let of_contact = body.contact.as_ref().map_or(0, |contact| NUMBERS * contact.obstacles.len());
-        let recorder = Rc::new(Recorder::new(gpu, body.motions.len() + of_contact));
+        let recorder = Rc::new(Recorder::new(gpu, motions(body)));
         let order = DeviceOrder::of(body);
         let places = &order.places;
         // [`Backend::matrix`] cannot refuse it.
         let entries = body.mass_matrix.as_ref().map_or(0, |matrix| 4 * matrix.values.len() as u64);
         recorder.fits("the consistent mass", entries)?;
         let (origin, constrained) = constrained(places.len(), &placed_constraints(body, places));
-        let largest = places.len().max(body.elements.len());
-        // One partial sum a group; two dimensions of groups may make a few more.
-        let smallest = options.work_group_size.min(GROUP) as usize;
-        let partials = largest.div_ceil(smallest) + (1 << 16) + body.batches.len();
+        recorder.fits("a vector over the nodes", size_of_val(&*origin) as u64)?;
+        let has_supports = !constrained.is_empty();
         let backend = Self {
-            origin: recorder.filled("a vector over the nodes", &origin)?,
+            origin: recorder.filled(VECTORS, &origin)?,
             masks: origin.iter().map(|v| v[3]).collect(),
-            constrained: recorder.filled("constrained nodes", &constrained)?,
+            constrained: if has_supports { Some(recorder.filled(CONSTRAINED, &constrained)?) } else { None },
             constrained_nodes: constrained.len(),
             motions: body.motions.len(),
-            held: recorder.memory("held nodes", 16 * body.contact.as_ref().map_or(0, |c| c.nodes.len()) as u64)?,
+            held: None,
             held_nodes: 0,
-            partials: recorder.memory("partial sums", 4 * partials as u64)?,
-            gate: Rc::new(recorder.filled("a gate", &open_gate())?),
+            surface: body.contact.as_ref().map_or(0, |c| c.nodes.len()),
+            partials: recorder.memory(PARTIALS, 4 * partial_sums(body, options.work_group_size) as u64)?,
+            gate: Rc::new(recorder.filled(REGISTERS_HELD, &open_gate())?),
             recorder,
             options,
             order,
@@ -200,8 +203,7 @@ impl GpuBackend {
     fn vector(&self) -> GpuVector {
         let kept = self.unused.borrow_mut().pop();
         // A vector as large as `origin`, which the device could bind.
-        let made =
-            || self.recorder.memory("a vector", 16 * self.nodes() as u64).expect("as large as one that was made");
+        let made = || self.recorder.memory(VECTORS, 16 * self.nodes() as u64).expect("as large as one that was made");
         GpuVector { memory: kept.unwrap_or_else(|| Rc::new(made())), unused: Rc::clone(&self.unused) }
     }
 
@@ -342,9 +344,9 @@ impl Backend for GpuBackend {
         let matrix = matrix.placed(&self.order.places);
         let entries: Vec<f32> = matrix.values.iter().map(|&v| v as f32).collect();
         GpuMatrix {
-            offsets: self.recorder.filled("rows of the mass", &matrix.offsets).expect(filled),
-            columns: self.recorder.filled("columns of the mass", &matrix.columns).expect(filled),
-            entries: self.recorder.filled("the consistent mass", &entries).expect(filled),
+            offsets: self.recorder.filled(MASS_MATRIX, &matrix.offsets).expect(filled),
+            columns: self.recorder.filled(MASS_MATRIX, &matrix.columns).expect(filled),
+            entries: self.recorder.filled(MASS_MATRIX, &entries).expect(filled),
         }
     }
 
@@ -386,36 +388,37 @@ impl Backend for GpuBackend {
         let content: Vec<[u32; 4]> = held.iter().map(node).collect();
         self.held_nodes = content.len();
         if !content.is_empty() {
-            self.recorder.write(&self.held, &content);
+            let made = || self.recorder.memory(HELD, 16 * self.surface as u64).expect("less than a vector");
+            self.recorder.write(self.held.get_or_insert_with(made), &content);
         }
     }
 
     fn project_held(&self, x: &mut GpuVector) {
-        if self.held_nodes > 0 {
-            self.run(Operation::ProjectHeld, [self.held_nodes as u32, 0, 0, 0], &[&self.held, &x.memory]);
+        if let Some(held) = self.held.as_ref().filter(|_| self.held_nodes > 0) {
+            self.run(Operation::ProjectHeld, [self.held_nodes as u32, 0, 0, 0], &[held, &x.memory]);
         }
     }
 
     fn even_out(&self, x: &mut GpuVector) {
-        if self.held_nodes > 0 {
-            self.run(Operation::EvenOut, [self.held_nodes as u32, 0, 0, 0], &[&self.held, &x.memory]);
+        if let Some(held) = self.held.as_ref().filter(|_| self.held_nodes > 0) {
+            self.run(Operation::EvenOut, [self.held_nodes as u32, 0, 0, 0], &[held, &x.memory]);
         }
     }
 
     fn impose(&self, motions: &[f64], x: &mut GpuVector) {
-        if self.constrained_nodes > 0 {
+        if let Some(constrained) = &self.constrained {
             debug_assert_eq!(motions.len(), self.motions);
             let numbers = [self.constrained_nodes as u32, self.recorder.motions(motions), 0, 0];
-            self.run(Operation::Impose, numbers, &[&self.constrained, self.recorder.values(), &x.memory]);
+            self.run(Operation::Impose, numbers, &[constrained, self.recorder.values(), &x.memory]);
         }
     }
 
     fn impose_change(&self, motions: &[f64], x: &GpuVector, y: &mut GpuVector) {
-        if self.constrained_nodes > 0 {
+        if let Some(constrained) = &self.constrained {
             debug_assert_eq!(motions.len(), self.motions);
             let numbers = [self.constrained_nodes as u32, self.recorder.motions(motions), 0, 0];
             let values = self.recorder.values();
-            self.run(Operation::ImposeChange, numbers, &[&self.constrained, values, &x.memory, &y.memory]);
+            self.run(Operation::ImposeChange, numbers, &[constrained, values, &x.memory, &y.memory]);
         }
     }
 
@@ -433,7 +436,7 @@ impl Backend for GpuBackend {
 
     fn registers(&self, values: [f64; REGISTERS]) -> GpuRegisters {
         let values = values.map(|v| v as f32);
-        GpuRegisters(self.recorder.filled("registers", &values).expect("every device binds 64 bytes"))
+        GpuRegisters(self.recorder.filled(REGISTERS_HELD, &values).expect("every device binds 64 bytes"))
     }
 
     fn load(&self, values: [f64; REGISTERS], registers: &mut GpuRegisters) {
@@ -473,6 +476,13 @@ impl Backend for GpuBackend {
         let storage = [&registers.0, d, q, preconditioner, x, r, z, &self.partials];
         let groups = self.run(Operation::Descend, self.numbers(0.0), &storage);
         self.sum_is_pending(groups);
+    }
+
+    fn advance(&self, advance: Advance<Self>) {
+        let Advance { force, masses, keep, kick, drift, v, u } = advance;
+        let [keep, kick, drift] = [keep, kick, drift].map(|x| (x as f32).to_bits());
+        let vectors = [force, masses, &*v, &*u].map(|v| &*v.memory);
+        self.run(Operation::Advance, [self.nodes() as u32, keep, kick, drift], &vectors);
     }
 
     fn pressure(&self, faces: &[PressedFace]) -> GpuPressure {
@@ -522,6 +532,15 @@ impl Backend for GpuBackend {
 
     fn counts(&self) -> Counts {
         self.recorder.counts()
+    }
+
+    fn ledger(&self) -> &Ledger {
+        self.recorder.ledger()
+    }
+
+    fn trim(&self) {
+        self.recorder.unbind();
+        self.unused.borrow_mut().clear();
     }
 
     fn check(&self) -> Result<(), DeviceError> {

@@ -11,6 +11,7 @@ use crate::contact::{
     Shape, Solid, Surface, at_end, further, respond, seen_before,
 };
 use crate::history::History;
+use crate::inventory::names;
 
 use super::GpuBackend;
 use super::backend::GpuVector;
@@ -30,7 +31,8 @@ pub struct GpuContact {
     tolerance: f64,
     /// The pass without and with impulses, compiled when a step first needs it.
     touch: [OnceCell<Rc<Kernel>>; 2],
-    gap: Rc<Kernel>,
+    /// That which measures the gap, likewise.
+    gap: OnceCell<Rc<Kernel>>,
 }
 
 /// The bits of a position, and a place.
@@ -70,15 +72,15 @@ impl GpuContact {
         let nodes: Vec<[u32; 4]> = each.map(|(node, [x, y, z])| [bits(*x), bits(*y), bits(*z), place(node)]).collect();
         let obstacles = &contact.obstacles;
         let values: Vec<f32> = grids(obstacles).flat_map(|grid| grid.values()).copied().collect();
-        let grids = (!values.is_empty()).then(|| backend.recorder().filled_or_failed("grids of distances", &values));
+        let grids = (!values.is_empty()).then(|| backend.recorder().filled_or_failed(names::GRIDS, &values));
         Self {
             grids,
             count: nodes.len(),
-            nodes: backend.recorder().filled("nodes of the surface", &nodes).expect("fewer than nodes"),
+            nodes: backend.recorder().filled(names::SURFACE, &nodes).expect("fewer than nodes"),
             obstacles: obstacles.clone(),
             tolerance: contact.tolerance(f64::from(f32::EPSILON) / 2.0),
             touch: Default::default(),
-            gap: backend.kernel("gap", &gap_text(obstacles), &gap_arguments(obstacles)),
+            gap: OnceCell::new(),
         }
     }
 
@@ -106,7 +108,9 @@ impl GpuContact {
         let numbers = [self.count as u32, 0, (limit as f32).to_bits(), base];
         let mut storage = vec![&self.nodes, backend.recorder().values(), u.memory(), backend.partials()];
         storage.extend(&self.grids);
-        let groups = backend.dispatch_each(&self.gap, numbers, &storage);
+        let text = || gap_text(&self.obstacles);
+        let kernel = self.gap.get_or_init(|| backend.kernel("gap", &text(), &gap_arguments(&self.obstacles)));
+        let groups = backend.dispatch_each(kernel, numbers, &storage);
         let nearer = backend.recorder().read::<f32>(backend.partials(), (groups[0] * groups[1]) as usize);
         nearer.map_or(f64::NAN, |nearer| limit - f64::from(nearer.into_iter().fold(0.0, f32::max)))
     }

@@ -4,20 +4,21 @@
 //! own. Pass 2: one invocation a node sums the slots of its elements in ascending order. No two invocations write one place.
 //! A page is as much of the mesh as the device can bind; smaller bodies have one. Pages take turns with one buffer of slots.
 
-use std::collections::HashMap;
 use std::rc::Rc;
 
-use tensormass_kernels::shader::{Argument, Binding, Pass, Shader, Unit, element_pass, node_product, node_sum};
-use tensormass_kernels::{ElementEntry, LawEntry};
+use tensormass_kernels::LawEntry;
+use tensormass_kernels::shader::{Argument, Binding, Pass};
 
 use crate::backend::{Backend, ForceField, LeftDomain, Operator};
 use crate::body::{Body, LawBatch};
 use crate::device::DeviceError;
+use crate::inventory::names::{OUTPUTS, PARTIAL_FORCES};
 
 use super::backend::{GpuBackend, GpuRegisters, GpuVector};
 use super::page::{Page, Range, pages};
-use super::recorder::{Kernel, Memory, Recorder};
-use super::shaders::{Access, Operation};
+use super::passes::Passes;
+use super::recorder::{Memory, Recorder};
+use super::shaders::Operation;
 
 /// Which elements a pass runs over.
 #[derive(Debug, Clone, Copy)]
@@ -27,12 +28,6 @@ enum Of {
     Damped,
 }
 
-/// A pass that the device has compiled.
-struct Compiled {
-    kernel: Rc<Kernel>,
-    bindings: Vec<Binding>,
-}
-
 /// All elements of a body.
 pub struct GpuField {
     recorder: Rc<Recorder>,
@@ -40,15 +35,13 @@ pub struct GpuField {
     /// The elements of laws with a dissipation, with slots of their own, where some laws have one and some do not.
     damped: Option<Vec<Page>>,
     slots: Memory,
-    /// The displacement at which the tangent is taken; none where no law's tangent depends on it.
+    /// The displacement at which the tangent is taken; none where no law's tangent depends on it, or none was prepared.
     state: Option<GpuVector>,
+    /// Whether the tangent of a law depends on it.
+    depends: bool,
     gate: Rc<Memory>,
     elements: usize,
-    /// Element passes by law, kind, the stride of constants and what an invocation computes, compiled when first needed: a
-    /// scene has those of its pairs.
-    element_passes: HashMap<(&'static str, &'static str, u32, Pass, Unit), Rc<Compiled>>,
-    /// The node passes, by whether they make a product.
-    node_passes: HashMap<bool, Rc<Compiled>>,
+    passes: Passes,
     work_group_size: u32,
     elements_per_invocation: u32,
     domains: Domains,
@@ -97,14 +90,13 @@ impl GpuField {
         let depends = |law: &LawEntry, pass: Pass| {
             pass.function(law).is_some_and(|f| f.arguments.contains(&Argument::DisplacementGradient))
         };
-        let state = body.batches.iter().any(|b| depends(b.law, Pass::DForce) || depends(b.law, Pass::Diagonal));
         let field = Self {
-            slots: recorder.memory("partial forces", slot_bytes)?,
-            state: state.then(|| backend.zeros()),
+            slots: recorder.memory(PARTIAL_FORCES, slot_bytes)?,
+            state: None,
+            depends: body.batches.iter().any(|b| depends(b.law, Pass::DForce) || depends(b.law, Pass::Diagonal)),
             gate: Rc::clone(backend.gate()),
             elements: body.elements.len(),
-            element_passes: HashMap::new(),
-            node_passes: HashMap::new(),
+            passes: Passes::new(&recorder, options),
             work_group_size: options.work_group_size,
             elements_per_invocation: options.elements_per_invocation,
             domains: Domains::AtOnce,
@@ -123,54 +115,7 @@ impl GpuField {
 
     /// The passes over elements that the device has compiled so far: those of the laws and kinds that were computed.
     pub fn compiled_element_passes(&self) -> usize {
-        self.element_passes.len()
-    }
-
-    /// The pass of a law on a kind of element, compiled.
-    fn element_pass(
-        &mut self,
-        (law, element, unit): (&LawEntry, &ElementEntry, Unit),
-        stride: u32,
-        pass: Pass,
-    ) -> Rc<Compiled> {
-        let key = (law.info.name, element.info.name, stride, pass, unit);
-        if let Some(made) = self.element_passes.get(&key) {
-            return Rc::clone(made);
-        }
-        let shader = element_pass(law, element, pass, unit).expect("damping runs over laws with a dissipation");
-        let label = format!("{pass:?}: {}, {}, {unit:?}", law.info.name, element.info.name);
-        let made = Rc::new(self.compiled(shader, stride, &label));
-        self.element_passes.insert(key, Rc::clone(&made));
-        made
-    }
-
-    /// The pass over nodes that makes a product, or that which adds sums, compiled.
-    fn node_pass_of(&mut self, product: bool) -> Rc<Compiled> {
-        if let Some(made) = self.node_passes.get(&product) {
-            return Rc::clone(made);
-        }
-        let (shader, label) = if product { (node_product(), "product at nodes") } else { (node_sum(), "sum of slots") };
-        let made = Rc::new(self.compiled(shader, 0, label));
-        self.node_passes.insert(product, Rc::clone(&made));
-        made
-    }
-
-    fn compiled(&self, shader: Shader, stride: u32, label: &str) -> Compiled {
-        let access = |b: &Binding| match (b.is_uniform(), b.is_written()) {
-            (true, _) => Access::Uniform,
-            (false, true) => Access::Write,
-            (false, false) => Access::Read,
-        };
-        let accesses: Vec<Access> = shader.bindings.iter().map(access).collect();
-        let mut constants = vec![("work_group_size", f64::from(self.work_group_size))];
-        if shader.bindings.contains(&Binding::ElementPass) {
-            constants.push(("elements_per_invocation", f64::from(self.elements_per_invocation)));
-        }
-        if shader.bindings.contains(&Binding::Constants) {
-            constants.push(("constants_stride", f64::from(stride)));
-        }
-        let kernel = self.recorder.kernel(label, &shader.text, &accesses, &constants);
-        Compiled { kernel, bindings: shader.bindings }
+        self.passes.of_elements()
     }
 
     /// The pages of some elements: where every law has a dissipation, those of all.
@@ -184,15 +129,20 @@ impl GpuField {
     /// Pass 1 of one page: a pass of each law and kind.
     fn element_passes(&mut self, of: Of, page: usize, pass: Pass, bound: &Bound) {
         for range in 0..self.pages_of(of)[page].ranges.len() {
-            let Range { stride, law, element, unit, units, .. } = self.pages_of(of)[page].ranges[range];
-            let compiled = self.element_pass((law, element, unit), stride, pass);
-            let range = &self.pages_of(of)[page].ranges[range];
-            let storage: Vec<&Memory> = compiled.bindings[1..].iter().map(|&b| self.buffer(b, range, bound)).collect();
-            let invocations = units.div_ceil(self.elements_per_invocation as usize);
-            let groups = self.recorder.groups(invocations, self.work_group_size);
-            let keeps = u32::from(pass == Pass::Force && self.domains == Domains::Kept);
-            self.recorder.dispatch(&compiled.kernel, [units as u32, keeps, range.first_slot, 0], &storage, groups);
+            self.range_pass(of, (page, range), pass, bound);
         }
+    }
+
+    /// The pass of one law and kind.
+    fn range_pass(&mut self, of: Of, (page, range): (usize, usize), pass: Pass, bound: &Bound) {
+        let Range { stride, law, element, unit, units, .. } = self.pages_of(of)[page].ranges[range];
+        let compiled = self.passes.element((law, element, unit), stride, pass);
+        let range = &self.pages_of(of)[page].ranges[range];
+        let storage: Vec<&Memory> = compiled.bindings[1..].iter().map(|&b| self.buffer(b, range, bound)).collect();
+        let invocations = units.div_ceil(self.elements_per_invocation as usize);
+        let groups = self.recorder.groups(invocations, self.work_group_size);
+        let keeps = u32::from(pass == Pass::Force && self.domains == Domains::Kept);
+        self.recorder.dispatch(&compiled.kernel, [units as u32, keeps, range.first_slot, 0], &storage, groups);
     }
 
     fn buffer<'a>(&'a self, binding: Binding, range: &'a Range, bound: &Bound<'a>) -> &'a Memory {
@@ -203,7 +153,9 @@ impl GpuField {
             Binding::Constants => Some(&range.constants),
             Binding::Slots => Some(&self.slots),
             Binding::Margins => range.margins.as_ref(),
-            Binding::Energies | Binding::Stresses => range.output.as_ref(),
+            // Fewer numbers than an element's partial forces, and read before the next ones are written.
+            Binding::Energies => Some(&self.slots),
+            Binding::Stresses => range.output.as_ref(),
             Binding::Displacement => bound.displacement.or_else(state),
             Binding::Velocity => bound.velocity,
             Binding::Increment => bound.increment,
@@ -219,9 +171,16 @@ impl GpuField {
         found.expect("element passes bind what a range has or the caller gives")
     }
 
+    /// Takes the tangent at rest, if none was taken and it depends on the state.
+    fn tangent_is_taken(&mut self, backend: &GpuBackend) {
+        if self.depends {
+            self.state.get_or_insert_with(|| backend.zeros());
+        }
+    }
+
     /// Pass 2 of one page: y += factor times the sum of each node's slots.
     fn node_pass(&mut self, of: Of, page: usize, nodes: usize, factor: f64, y: &GpuVector) {
-        let compiled = self.node_pass_of(false);
+        let compiled = self.passes.node(false);
         let numbers = [nodes as u32, 0, (factor as f32).to_bits(), 0];
         let storage = [&self.slots, &self.pages_of(of)[page].incidence, y.memory()];
         let groups = self.recorder.groups(nodes, self.work_group_size);
@@ -251,7 +210,7 @@ impl GpuField {
         let groups = self.recorder.groups(nodes, self.work_group_size);
         for page in 0..self.pages_of(of).len() {
             self.element_passes(of, page, pass, bound);
-            let compiled = self.node_pass_of(true);
+            let compiled = self.passes.node(true);
             let mass = first.filter(|_| page == 0);
             // The slots hold -K x or -C x.
             let factors = [-factor, mass.or(first).unwrap_or(0.0)].map(|f| (f as f32).to_bits());
@@ -304,24 +263,26 @@ impl GpuField {
 
     /// Runs an output pass of `width` numbers an element; the numbers in the mesh's order. NaN if the device fails.
     fn output(&mut self, u: &GpuVector, pass: Pass, width: usize) -> Vec<f64> {
-        for page in 0..self.pages.len() {
-            for range in &mut self.pages[page].ranges {
-                // As large as the widest pass that was asked for: energies alone take a ninth of stresses.
-                let bytes = 4 * (width * range.elements.len()) as u64;
-                if range.output.as_ref().is_none_or(|output| output.bytes() < bytes) {
-                    range.output = self.recorder.memory("values of elements", bytes).ok();
-                }
-            }
-            let bound = Bound { displacement: Some(u.memory()), ..Bound::default() };
-            self.element_passes(Of::All, page, pass, &bound);
-        }
         let mut values = vec![f64::NAN; width * self.elements];
-        for range in self.pages.iter().flat_map(|p| &p.ranges) {
-            let count = width * range.elements.len();
-            let read = range.output.as_ref().and_then(|output| self.recorder.read::<f32>(output, count));
-            for (&e, read) in range.elements.iter().zip(read.iter().flat_map(|r| r.chunks(width))) {
-                for (value, &read) in values[width * e as usize..].iter_mut().zip(read) {
-                    *value = read.into();
+        let bound = Bound { displacement: Some(u.memory()), ..Bound::default() };
+        for page in 0..self.pages.len() {
+            for k in 0..self.pages[page].ranges.len() {
+                let range = &mut self.pages[page].ranges[k];
+                let count = width * range.elements.len();
+                if pass != Pass::Energy && range.output.is_none() {
+                    range.output = self.recorder.memory(OUTPUTS, 4 * count as u64).ok();
+                    if range.output.is_none() {
+                        continue;
+                    }
+                }
+                self.range_pass(Of::All, (page, k), pass, &bound);
+                let range = &self.pages[page].ranges[k];
+                let output = range.output.as_ref().filter(|_| pass != Pass::Energy).unwrap_or(&self.slots);
+                let read = self.recorder.read::<f32>(output, count);
+                for (&e, read) in range.elements.iter().zip(read.iter().flat_map(|r| r.chunks(width))) {
+                    for (value, &read) in values[width * e as usize..].iter_mut().zip(read) {
+                        *value = read.into();
+                    }
                 }
             }
         }
@@ -365,17 +326,24 @@ impl ForceField<GpuBackend> for GpuField {
     }
 
     fn prepare(&mut self, backend: &GpuBackend, u: &GpuVector) {
-        if let Some(state) = &mut self.state {
-            backend.copy(u, state);
+        if self.depends {
+            backend.copy(u, self.state.get_or_insert_with(|| backend.zeros()));
         }
     }
 
+    fn forget_tangent(&mut self, _: &GpuBackend) {
+        self.state = None;
+        self.passes.forget_tangent();
+    }
+
     fn add_dforce(&mut self, backend: &GpuBackend, du: &GpuVector, factor: f64, df: &mut GpuVector) {
+        self.tangent_is_taken(backend);
         let bound = Bound { increment: Some(du.memory()), ..Bound::default() };
         self.passes(backend, (Of::All, Pass::DForce), &bound, factor, df);
     }
 
     fn add_diagonal(&mut self, backend: &GpuBackend, factor: f64, d: &mut GpuVector) {
+        self.tangent_is_taken(backend);
         self.passes(backend, (Of::All, Pass::Diagonal), &Bound::default(), factor, d);
     }
 
@@ -417,8 +385,10 @@ impl ForceField<GpuBackend> for GpuField {
         y: &mut GpuVector,
         registers: &mut GpuRegisters,
     ) {
+        self.tangent_is_taken(backend);
         let bound = Bound { increment: Some(x.memory()), gate: Some(registers.memory()), ..Bound::default() };
-        let (masses, vectors) = (operator.masses.diagonal(), [x, &*y]);
+        // Without masses their factor is 0, and x as good as any.
+        let (masses, vectors) = (operator.masses.diagonal().unwrap_or(x), [x, &*y]);
         // Lumped masses come with the first part; the consistent matrix has a pass of its own before it.
         let lumped = operator.masses.matrix().is_none().then_some(operator.mass);
         if let Some(matrix) = operator.masses.matrix() {

@@ -8,6 +8,7 @@ mod contact;
 mod device;
 mod field;
 mod page;
+mod passes;
 mod pressure;
 mod recorder;
 mod shaders;

@@ -6,6 +6,7 @@ use tensormass_kernels::{ElementEntry, ElementInfo, LawEntry, RestPoint};
 
 use crate::body::{Body, LawBatch};
 use crate::device::DeviceError;
+use crate::inventory::names::{CONSTANTS, ELEMENT_NODES, MARGINS, REST, SLOTS};
 use crate::mesh::Incidence;
 use crate::order::Grouped;
 use crate::strips::{Member, reordered};
@@ -34,7 +35,7 @@ pub(super) struct Range {
     pub first_slot: u32,
     /// Only where the law has a domain.
     pub margins: Option<Memory>,
-    /// For what an output pass writes, made when one is asked for.
+    /// For stresses, made when some are asked for.
     pub output: Option<Memory>,
 }
 
@@ -209,7 +210,7 @@ impl Page {
             first_slot += range.slots() as u32;
             ranges.push(range);
         }
-        Ok(Self { ranges, incidence: recorder.filled("slots of nodes", &lists)? })
+        Ok(Self { ranges, incidence: recorder.filled(SLOTS, &lists)? })
     }
 
     /// Bytes of the slots of all its elements.
@@ -258,7 +259,7 @@ impl Range {
         // A law whose stress tells a margin has a domain.
         let has_margin = Pass::Force.function(batch.law).is_some_and(|f| f.field.is_some());
         let margins = match has_margin {
-            true => Some(recorder.memory("margins of elements", 4 * elements.len() as u64)?),
+            true => Some(recorder.memory(MARGINS, 4 * elements.len() as u64)?),
             false => None,
         };
         Ok(Self {
@@ -267,9 +268,9 @@ impl Range {
             unit: units.unit(),
             units: units.len(),
             stride: if batch.per_element { count as u32 } else { 0 },
-            nodes: recorder.filled("nodes of elements", &nodes)?,
-            rest: recorder.filled("rest data of elements", &rest)?,
-            constants: recorder.filled("constants of materials", &constants)?,
+            nodes: recorder.filled(ELEMENT_NODES, &nodes)?,
+            rest: recorder.filled(REST, &rest)?,
+            constants: recorder.filled(CONSTANTS, &constants)?,
             first_slot,
             margins,
             output: None,

@@ -10,6 +10,7 @@ use super::recorder::{Kernel, Memory};
 use super::shaders::{Access, Argument, Frame, module, vector};
 use crate::body::PressedFace;
 use crate::device::DeviceError;
+use crate::inventory::names::PRESSED;
 
 /// Faces under a pressure on a GPU.
 #[derive(Debug)]
@@ -102,13 +103,13 @@ impl Faces {
         }
         Ok(Self {
             count: faces.len(),
-            slots: recorder.memory("forces of pressure", 16 * nodes.len() as u64)?,
-            nodes: recorder.filled("nodes under pressure", &nodes)?,
-            tangents: recorder.filled("tangents of faces", &tangents)?,
+            slots: recorder.memory(PRESSED, 16 * nodes.len() as u64)?,
+            nodes: recorder.filled(PRESSED, &nodes)?,
+            tangents: recorder.filled(PRESSED, &tangents)?,
             face_pass: backend.kernel("pressure: faces", &face_text(kind), &face_arguments()),
             sum_count: sums.len(),
-            sums: recorder.filled("nodes under pressure", &sums)?,
-            order: recorder.filled("slots of nodes under pressure", &order)?,
+            sums: recorder.filled(PRESSED, &sums)?,
+            order: recorder.filled(PRESSED, &order)?,
             node_pass: backend.kernel("pressure: nodes", &node_text(), &node_arguments()),
         })
     }

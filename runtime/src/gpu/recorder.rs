@@ -3,21 +3,23 @@
 //! Dispatches run in the order in which they were recorded. What the host writes is ordered with them: numbers of a
 //! pass and values of motions travel with the submission that uses them; a buffer is written between two submissions.
 
-use std::cell::{Cell, RefCell};
+use std::cell::{Cell, OnceCell, RefCell};
 use std::collections::HashMap;
 use std::rc::Rc;
 use std::sync::Arc;
 
 use crate::backend::Counts;
 use crate::device::DeviceError;
+use crate::device_memory::{self, ALIGNMENT, PASSES};
+use crate::inventory::names::{MOTIONS, NUMBERS, RESULTS};
+use crate::inventory::{Lease, Ledger, Tally};
 
 use super::device::Gpu;
 use super::shaders::Access;
 
-/// Distance of the numbers of two passes: WebGPU's alignment of uniform offsets.
-const ALIGNMENT: u64 = 256;
-/// Passes with numbers of their own in one submission.
-const PASSES: u64 = 1024;
+/// Bytes of the numbers of all passes of a submission.
+const NUMBERS_BYTES: u64 = PASSES * ALIGNMENT;
+
 /// The numbers of a pass, as bits: four of 32 bits each.
 pub(super) type Numbers = [u32; 4];
 
@@ -26,19 +28,14 @@ pub(super) type Numbers = [u32; 4];
 pub(super) struct Memory {
     id: u64,
     buffer: wgpu::Buffer,
-}
-
-impl Memory {
-    /// Its size.
-    pub(super) fn bytes(&self) -> u64 {
-        self.buffer.size()
-    }
+    _lease: Lease,
 }
 
 /// A compiled shader.
 #[derive(Debug)]
 pub(super) struct Kernel {
     id: u64,
+    tally: Tally,
     pipeline: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
 }
@@ -47,14 +44,17 @@ pub(super) struct Kernel {
 #[derive(Debug)]
 pub(super) struct Recorder {
     gpu: Arc<Gpu>,
+    ledger: Ledger,
     uniforms: wgpu::Buffer,
-    values: Memory,
+    _lease: Lease,
+    /// Values of motions, where there are some.
+    values: OnceCell<Memory>,
     /// Values of motions that one submission takes.
     capacity: usize,
     next: Cell<u64>,
     list: RefCell<List>,
     groups: RefCell<HashMap<(u64, Vec<u64>), wgpu::BindGroup>>,
-    staging: RefCell<Option<wgpu::Buffer>>,
+    staging: RefCell<Option<(wgpu::Buffer, Lease)>>,
     counts: Cell<Counts>,
 }
 
@@ -72,24 +72,20 @@ struct List {
 }
 
 impl Recorder {
-    /// A recorder for a body with this many motions.
-    pub(super) fn new(gpu: Arc<Gpu>, motions: usize) -> Self {
-        // Room for several impositions in one submission.
-        let capacity = (4 * motions).max(1024);
-        let buffer = |label, size, usage| {
-            let usage = usage | wgpu::BufferUsages::COPY_DST;
-            gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size,
-                usage,
-                mapped_at_creation: false,
-            })
-        };
-        let uniforms = buffer("numbers of passes", PASSES * ALIGNMENT, wgpu::BufferUsages::UNIFORM);
-        let values = buffer("values of motions", 4 * capacity as u64, wgpu::BufferUsages::STORAGE);
+    /// A recorder whose submissions take this many values of motions.
+    pub(super) fn new(gpu: Arc<Gpu>, capacity: usize) -> Self {
+        let uniforms = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(NUMBERS),
+            size: NUMBERS_BYTES,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let ledger = Ledger::default();
         Self {
+            _lease: ledger.hold(NUMBERS, NUMBERS_BYTES as usize),
+            ledger,
             uniforms,
-            values: Memory { id: 0, buffer: values },
+            values: OnceCell::new(),
             capacity,
             gpu,
             next: Cell::new(1),
@@ -108,9 +104,13 @@ impl Recorder {
         self.counts.get()
     }
 
+    pub(super) fn ledger(&self) -> &Ledger {
+        &self.ledger
+    }
+
     /// The values that [`Recorder::motions`] records, as an argument.
     pub(super) fn values(&self) -> &Memory {
-        &self.values
+        self.values.get_or_init(|| self.memory(MOTIONS, 4 * self.capacity as u64).expect("a few numbers a motion"))
     }
 
     fn id(&self) -> u64 {
@@ -121,17 +121,17 @@ impl Recorder {
     ///
     /// # Errors
     /// It is larger than the device can bind.
-    pub(super) fn memory(&self, what: &str, bytes: u64) -> Result<Memory, DeviceError> {
+    pub(super) fn memory(&self, what: &'static str, bytes: u64) -> Result<Memory, DeviceError> {
         self.fits(what, bytes)?;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
-        let size = bytes.max(16).next_multiple_of(4);
+        let size = device_memory::bytes(bytes);
         let buffer = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(what),
             size,
             usage,
             mapped_at_creation: false,
         });
-        Ok(Memory { id: self.id(), buffer })
+        Ok(Memory { id: self.id(), buffer, _lease: self.ledger.hold(what, size as usize) })
     }
 
     /// Whether the device can bind a buffer of this size.
@@ -150,14 +150,14 @@ impl Recorder {
     ///
     /// # Errors
     /// It is larger than the device can bind.
-    pub(super) fn filled<T: bytemuck::Pod>(&self, what: &str, content: &[T]) -> Result<Memory, DeviceError> {
+    pub(super) fn filled<T: bytemuck::Pod>(&self, what: &'static str, content: &[T]) -> Result<Memory, DeviceError> {
         let memory = self.memory(what, size_of_val(content) as u64)?;
         self.write(&memory, content);
         Ok(memory)
     }
 
     /// As [`Recorder::filled`]; a buffer of nothing where the device cannot bind as much, which it says when it is checked.
-    pub(super) fn filled_or_failed<T: bytemuck::Pod>(&self, what: &str, content: &[T]) -> Memory {
+    pub(super) fn filled_or_failed<T: bytemuck::Pod>(&self, what: &'static str, content: &[T]) -> Memory {
         self.filled(what, content).unwrap_or_else(|error| {
             self.gpu.fail(error);
             self.memory(what, 0).expect("16 bytes")
@@ -207,7 +207,7 @@ impl Recorder {
             compilation_options: wgpu::PipelineCompilationOptions { constants, ..Default::default() },
             cache: None,
         });
-        Rc::new(Kernel { id: self.id(), pipeline, layout })
+        Rc::new(Kernel { id: self.id(), tally: self.ledger.kernel(label), pipeline, layout })
     }
 
     /// Work groups in two dimensions for this many invocations; their product may be a little more than needed.
@@ -231,7 +231,14 @@ impl Recorder {
         let group = bound.entry(key).or_insert_with(|| self.bind(kernel, storage));
         pass.set_bind_group(0, &*group, &[offset]);
         pass.dispatch_workgroups(groups[0], groups[1], 1);
+        kernel.tally.ran();
         self.count(|c| c.dispatches += 1);
+    }
+
+    /// Lets go of what binds buffers and kernels that are gone: it keeps them.
+    pub(super) fn unbind(&self) {
+        self.submit();
+        self.groups.borrow_mut().clear();
     }
 
     fn bind(&self, kernel: &Kernel, storage: &[&Memory]) -> wgpu::BindGroup {
@@ -272,7 +279,7 @@ impl Recorder {
             list.written = list.uniforms.clone();
         }
         if !list.values.is_empty() {
-            queue.write_buffer(&self.values.buffer, 0, bytemuck::cast_slice(&list.values));
+            queue.write_buffer(&self.values().buffer, 0, bytemuck::cast_slice(&list.values));
         }
         queue.submit([encoder.finish()]);
         list.uniforms.clear();
@@ -310,17 +317,20 @@ impl Recorder {
     fn staging(&self, bytes: u64) -> wgpu::Buffer {
         let mut kept = self.staging.borrow_mut();
         match &*kept {
-            Some(buffer) if buffer.size() >= bytes => buffer.clone(),
+            Some((buffer, _)) if buffer.size() >= bytes => buffer.clone(),
             _ => {
+                // The old one goes first.
+                *kept = None;
                 let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
                 let size = bytes.next_power_of_two();
                 let buffer = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                    label: Some("results"),
+                    label: Some(RESULTS),
                     size,
                     usage,
                     mapped_at_creation: false,
                 });
-                kept.insert(buffer).clone()
+                let lease = self.ledger.hold(RESULTS, size as usize);
+                kept.insert((buffer, lease)).0.clone()
             }
         }
     }

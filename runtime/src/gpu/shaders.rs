@@ -5,9 +5,6 @@
 
 use crate::backend::{ALPHA, BETA, RUNNING};
 
-/// Invocations of a work group; a power of two, and WebGPU's default limit.
-pub(super) const GROUP: u32 = 256;
-
 const PRELUDE: &str = include_str!("wgsl/prelude.wgsl");
 const EACH: &str = include_str!("wgsl/each.wgsl");
 const REDUCE: &str = include_str!("wgsl/reduce.wgsl");
@@ -54,10 +51,12 @@ pub(super) enum Operation {
     Descend,
     /// d = z + beta d: registers, z, d.
     Turn,
+    /// v = keep v + a f / m, u += drift v: force, masses, v, u. The numbers k and base are the bits of keep and drift.
+    Advance,
 }
 
 /// All operations.
-pub(super) const OPERATIONS: [Operation; 19] = [
+pub(super) const OPERATIONS: [Operation; 20] = [
     Operation::Copy,
     Operation::Axpy,
     Operation::Xpby,
@@ -77,6 +76,7 @@ pub(super) const OPERATIONS: [Operation; 19] = [
     Operation::Sum,
     Operation::Descend,
     Operation::Turn,
+    Operation::Advance,
 ];
 
 /// How a kernel binds a buffer.
@@ -149,6 +149,9 @@ impl Operation {
                 vec![registers, d, q, preconditioner, x, r, z, PARTIALS]
             }
             Self::Turn => vec![registers, vector("z", Read), vector("d", Write)],
+            Self::Advance => {
+                vec![vector("force", Read), vector("masses", Read), vector("v", Write), vector("u", Write)]
+            }
         }
     }
 
@@ -256,6 +259,16 @@ fn term(i: u32) -> f32 {{
     return dot(residual, scaled);
 }}
 {SUM_JOINS}{REDUCE}"
+            ),
+            Self::Advance => format!(
+                "fn each(i: u32) {{
+    let old = v[i];
+    let velocity = bitcast<f32>(numbers.k) * old.xyz + numbers.a * (force[i].xyz / masses[i].xyz);
+    v[i] = vec4<f32>(velocity, old.w);
+    let place = u[i];
+    u[i] = vec4<f32>(place.xyz + bitcast<f32>(numbers.base) * velocity, place.w);
+}}
+{EACH}"
             ),
             Self::Turn => format!(
                 "fn each(i: u32) {{

@@ -101,15 +101,13 @@ fn relative(step: &LastStep, is_linearised: bool) -> Option<(f64, Option<f64>)> 
     let field = CpuField::<f64>::new(&backend, &body);
     let mut system = System::new(backend, field, body);
     let [h, time] = step.clock;
-    let upload = |x: &[[f64; 3]]| system.backend.upload(x);
-    let (start, v) = (upload(&step.before[0]), upload(&step.before[1]));
     let [mut residual, mut inner, mut inertia, mut diagonal] = std::array::from_fn(|_| system.backend.zeros());
     if step.solver.integrator == Integrator::Static {
         if is_linearised && !system.body.is_linear() {
             // The linear equations were those of a state that is gone.
             return None;
         }
-        let end = upload(step.after);
+        let end = system.backend.upload(step.after);
         system.force(&end, time, &mut residual).ok()?;
         system.field.add_force(&system.backend, &end, &mut inner).ok()?;
         system.field.prepare(&system.backend, &end);
@@ -118,7 +116,7 @@ fn relative(step: &LastStep, is_linearised: bool) -> Option<(f64, Option<f64>)> 
         let error = correction(&mut system, &end, &residual, &diagonal);
         return Some((ratio(&system, residual, diagonal, &[&inner]), error));
     }
-    let dv = upload(&step.solved.change);
+    let [start, v, dv] = [&step.before[0], &step.before[1], &step.solved.change].map(|x| system.backend.upload(x));
     let (alpha, beta, viscous) = (system.body.mass_damping, system.body.stiffness_damping, system.body.is_viscous());
     let mut rate = system.backend.zeros();
     system.backend.copy(&v, &mut rate);
@@ -152,7 +150,7 @@ fn relative(step: &LastStep, is_linearised: bool) -> Option<(f64, Option<f64>)> 
     if viscous {
         field.add_damping_diagonal(backend, [&start, &v], 1.0, &mut diagonal);
     }
-    backend.axpy(1.0 / h + alpha, masses.diagonal(), &mut diagonal);
+    backend.axpy(1.0 / h + alpha, masses.diagonal()?, &mut diagonal);
     Some((ratio(&system, residual, diagonal, &[&inner, &inertia]), None))
 }
 

@@ -13,37 +13,37 @@ use crate::system::{Integrator, SolveError, State, StepReport, System};
 fn impose<B: Backend, F: ForceField<B>>(system: &System<B, F>, state: &mut State<B>, time: f64, h: f64) {
     let (now, before) = (system.body.motions_at(time), system.body.motions_at(time - h));
     let velocity: Vec<f64> = now.iter().zip(&before).map(|(a, b)| (a - b) / h).collect();
-    system.backend.impose(&now, &mut state.u);
-    system.backend.impose(&velocity, &mut state.v);
+    let [u, v] = state.motion();
+    system.backend.impose(&now, u);
+    system.backend.impose(&velocity, v);
 }
 
 /// Semi-implicit (symplectic) Euler (Faure et al. 2012, eq. 17): V += h M^-1 F(U), then U += h V.
 pub struct SemiImplicitEuler<B: Backend> {
     force: B::Vector,
-    acceleration: B::Vector,
 }
 
 impl<B: Backend> SemiImplicitEuler<B> {
-    /// Work vectors for a body.
+    /// A work vector for a body.
     pub fn new(backend: &B) -> Self {
-        Self { force: backend.zeros(), acceleration: backend.zeros() }
+        Self { force: backend.zeros() }
     }
 }
 
 impl<B: Backend, F: ForceField<B>> Integrator<B, F> for SemiImplicitEuler<B> {
     fn step(&mut self, system: &mut System<B, F>, state: &mut State<B>, h: f64) -> Result<StepReport, SolveError> {
         system.force(&state.u, state.time, &mut self.force)?;
-        system.add_damping(&state.u, &state.v, &mut self.force);
+        system.add_damping(&state.u, state.velocity(), &mut self.force);
+        let [u, v] = state.motion();
         system.backend.advance(Advance {
             force: &self.force,
-            masses: system.masses.diagonal(),
-            acceleration: &mut self.acceleration,
+            masses: system.masses.of_motion(),
             // Damping -alpha M V at the beginning of the step.
             keep: 1.0 - h * system.body.mass_damping,
             kick: h,
             drift: h,
-            v: &mut state.v,
-            u: &mut state.u,
+            v,
+            u,
         });
         impose(system, state, state.time + h, h);
         system.meet_obstacles(state, h);
@@ -65,40 +65,45 @@ pub fn central_difference_coefficients(alpha: f64, h: f64) -> (f64, f64, f64) {
 /// step, w / h, except at the start.
 pub struct CentralDifference<B: Backend> {
     force: B::Vector,
-    acceleration: B::Vector,
     started: bool,
 }
 
 impl<B: Backend> CentralDifference<B> {
-    /// Work vectors for a body.
+    /// A work vector for a body.
     pub fn new(backend: &B) -> Self {
-        Self { force: backend.zeros(), acceleration: backend.zeros(), started: false }
+        Self { force: backend.zeros(), started: false }
     }
 }
 
 impl<B: Backend, F: ForceField<B>> Integrator<B, F> for CentralDifference<B> {
     fn step(&mut self, system: &mut System<B, F>, state: &mut State<B>, h: f64) -> Result<StepReport, SolveError> {
         system.force(&state.u, state.time, &mut self.force)?;
-        system.add_damping(&state.u, &state.v, &mut self.force);
+        system.add_damping(&state.u, state.velocity(), &mut self.force);
+        let [u, v] = state.motion();
         let alpha = system.body.mass_damping;
         let backend = &system.backend;
         if !self.started {
-            backend.divide(&self.force, system.masses.diagonal(), &mut self.acceleration);
             // u(-h) = u_0 - h v_0 + h^2 a_0 / 2 with a_0 = M^-1 f - alpha v_0: the velocity half a step before the start.
-            backend.scale(1.0 + 0.5 * h * alpha, &mut state.v);
-            backend.axpy(-0.5 * h, &self.acceleration, &mut state.v);
+            backend.advance(Advance {
+                force: &self.force,
+                masses: system.masses.of_motion(),
+                keep: 1.0 + 0.5 * h * alpha,
+                kick: -0.5 * h,
+                drift: 0.0,
+                v: &mut *v,
+                u: &mut *u,
+            });
             self.started = true;
         }
         let (gamma_1, _, gamma_3) = central_difference_coefficients(alpha, h);
         backend.advance(Advance {
             force: &self.force,
-            masses: system.masses.diagonal(),
-            acceleration: &mut self.acceleration,
+            masses: system.masses.of_motion(),
             keep: -gamma_3,
             kick: gamma_1 / h,
             drift: h,
-            v: &mut state.v,
-            u: &mut state.u,
+            v,
+            u,
         });
         impose(system, state, state.time + h, h);
         system.meet_obstacles(state, h);

@@ -16,7 +16,8 @@ use crate::contact::{ATTEMPTS, Attempt, Contact, Held, Holding};
 use crate::mass::Masses;
 use crate::system::{Integrator, SolveError, Solved, State, StepReport, System};
 
-use super::newton::{Equation, Newton, SolverSettings};
+use super::equation::Equation;
+use super::newton::{Newton, SolverSettings};
 
 /// Implicit Euler: V+ = V + h M^-1 (F(U+) + F_v(U, V+) - (alpha M + beta K(U)) V+), U+ = U + h V+.
 ///
@@ -27,19 +28,19 @@ pub struct ImplicitEuler<B: Backend> {
     newton: Newton<B>,
     settings: SolverSettings,
     dv: B::Vector,
-    /// Impulses that do not depend on dV: mass damping of V, friction.
-    constant: B::Vector,
+    /// Impulses that do not depend on dV, where there are some: mass damping of V, friction.
+    constant: Option<B::Vector>,
     holding: Holding,
 }
 
 impl<B: Backend> ImplicitEuler<B> {
-    /// Work vectors for a body of this many nodes.
-    pub fn new(backend: &B, nodes: usize, settings: SolverSettings) -> Self {
+    /// Work vectors for a body.
+    pub fn new(backend: &B, settings: SolverSettings) -> Self {
         Self {
-            newton: Newton::new(backend, nodes),
+            newton: Newton::new(backend),
             settings,
             dv: backend.zeros(),
-            constant: backend.zeros(),
+            constant: None,
             holding: Holding::default(),
         }
     }
@@ -63,11 +64,12 @@ impl<B: Backend> ImplicitEuler<B> {
         backend.clear(&mut self.dv);
         let has_constant =
             alpha != 0.0 || held.iter().any(|held| held.grip.friction != [0.0; 3] || held.grip.drag > 0.0);
-        if has_constant {
-            backend.clear(&mut self.constant);
-        }
-        if alpha != 0.0 {
-            system.masses.add(backend, -h * alpha, &state.v, &mut self.constant);
+        let mut constant = has_constant.then(|| self.constant.get_or_insert_with(|| backend.zeros()));
+        if let Some(constant) = &mut constant {
+            backend.clear(constant);
+            if alpha != 0.0 {
+                system.masses.add(backend, -h * alpha, state.velocity(), constant);
+            }
         }
         if !held.is_empty() {
             let (mut change, mut friction) = (vec![[0.0; 3]; v.len()], vec![[0.0; 3]; v.len()]);
@@ -84,11 +86,11 @@ impl<B: Backend> ImplicitEuler<B> {
                 }
             }
             backend.axpy(1.0, &backend.upload(&change), &mut self.dv);
-            if has_constant {
-                backend.axpy(1.0, &backend.upload(&friction), &mut self.constant);
+            if let Some(constant) = constant {
+                backend.axpy(1.0, &backend.upload(&friction), constant);
             }
         }
-        backend.impose_change(&velocity, &state.v, &mut self.dv);
+        backend.impose_change(&velocity, state.velocity(), &mut self.dv);
         let equation = Equation {
             mass: 1.0 + h * alpha,
             stiffness: h * h,
@@ -96,8 +98,8 @@ impl<B: Backend> ImplicitEuler<B> {
             force: h,
             time: end,
             u: &state.u,
-            velocity: Some(&state.v),
-            constant: has_constant.then_some(&self.constant),
+            velocity: Some(state.velocity()),
+            constant: self.constant.as_ref().filter(|_| has_constant),
             viscous: system.body.is_viscous(),
             stiffness_damping: system.body.stiffness_damping,
         };
@@ -128,7 +130,7 @@ impl<B: Backend> ImplicitEuler<B> {
     ) -> Result<StepReport, SolveError> {
         let passages = contact.passages(state.time, state.time + h);
         let tolerance = contact.tolerance(system.backend.epsilon());
-        let [u, v] = [&state.u, &state.v].map(|x| system.backend.download(x));
+        let [u, v] = [&state.u, state.velocity()].map(|x| system.backend.download(x));
         let mut holding = std::mem::take(&mut self.holding);
         holding.begin(contact, &passages, &u, tolerance);
         let mut report = StepReport::default();
@@ -172,9 +174,10 @@ impl<B: Backend, F: ForceField<B>> Integrator<B, F> for ImplicitEuler<B> {
         };
         let target = system.body.motions_at(state.time + h);
         let backend = &system.backend;
-        backend.axpy(1.0, &self.dv, &mut state.v);
-        backend.axpy(h, &state.v, &mut state.u);
-        backend.impose(&target, &mut state.u);
+        let [u, v] = state.motion();
+        backend.axpy(1.0, &self.dv, v);
+        backend.axpy(h, v, u);
+        backend.impose(&target, u);
         // What rounding left, and what did not settle.
         system.meet_obstacles(state, h);
         Ok(report)

@@ -1,5 +1,6 @@
 //! Integrators, written once over a backend's vectors.
 
+mod equation;
 mod explicit;
 mod implicit;
 mod newton;

@@ -3,7 +3,8 @@
 use crate::backend::{Backend, ForceField};
 use crate::system::{Integrator, SolveError, Solved, State, StepReport, System};
 
-use super::newton::{Equation, Newton, SolverSettings};
+use super::equation::Equation;
+use super::newton::{Newton, SolverSettings};
 
 /// Equilibrium at the end of each increment. A linear law takes one solution, and in f32 as many corrections as the
 /// Newton tolerance asks for; an increment that fails is halved.
@@ -17,9 +18,9 @@ pub struct Statics<B: Backend> {
 const DEPTH: u32 = 8;
 
 impl<B: Backend> Statics<B> {
-    /// Work vectors for a body of this many nodes.
-    pub fn new(backend: &B, nodes: usize, settings: SolverSettings) -> Self {
-        Self { newton: Newton::new(backend, nodes), settings, du: backend.zeros() }
+    /// Work vectors for a body.
+    pub fn new(backend: &B, settings: SolverSettings) -> Self {
+        Self { newton: Newton::new(backend), settings, du: backend.zeros() }
     }
 
     fn advance<F: ForceField<B>>(
@@ -67,11 +68,15 @@ impl<B: Backend> Statics<B> {
 
 impl<B: Backend, F: ForceField<B>> Integrator<B, F> for Statics<B> {
     fn step(&mut self, system: &mut System<B, F>, state: &mut State<B>, h: f64) -> Result<StepReport, SolveError> {
-        let mut before = system.backend.zeros();
-        system.backend.copy(&state.u, &mut before);
+        // An increment of linear laws is taken whole or not at all.
+        let before = (!system.body.is_linear()).then(|| {
+            let mut before = system.backend.zeros();
+            system.backend.copy(&state.u, &mut before);
+            before
+        });
         let result = self.advance(system, state, state.time, state.time + h, DEPTH);
-        if result.is_err() {
-            system.backend.copy(&before, &mut state.u);
+        if let (Err(_), Some(before)) = (&result, &before) {
+            system.backend.copy(before, &mut state.u);
         }
         result
     }

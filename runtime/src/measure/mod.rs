@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use tensormass_kernels::{ElementEntry, LawEntry};
 
 use crate::backend::{Backend, ForceField, LeftDomain};
-use crate::cpu::{CpuBackend, CpuField, Precision, place_bytes};
+use crate::cpu::{CpuBackend, CpuField, Precision, element_bytes};
 use crate::device::DeviceError;
 #[cfg(feature = "gpu")]
 use crate::gpu::{GpuBackend, GpuField};
@@ -288,7 +288,8 @@ fn on_cpu<R: Precision, M: Measurement>(
     let blocks: usize = model.body.batches.iter().map(|batch| blocks(&model.body, batch)).sum();
     let blocks = blocks as f64 / model.body.elements.len() as f64;
     let tangent = tangents[0];
-    let places = model.body.batches.iter().map(|batch| place_bytes::<R>(&model.body, batch)).sum::<usize>() as f64;
+    let places =
+        model.body.batches.iter().map(|batch| element_bytes::<R>(&model.body, batch).places).sum::<usize>() as f64;
     let places = places / model.body.elements.len() as f64;
     let layout = Layout { places, column: 2.0, slots, local: 4.0, own: 3.0 * real, tangent, blocks, ..sizes };
     measurement.on(subject, model, backend, field, layout)

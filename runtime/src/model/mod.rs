@@ -151,6 +151,7 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
         loads,
         pressures,
         contact: contact.map(Arc::new),
+        moves: scene.solver.integrator != scene::Integrator::Static,
         mass_damping: scene.solver.mass_damping * scale.time,
         stiffness_damping: scene.solver.stiffness_damping / scale.time,
         diameter: diagonal / scale.length,

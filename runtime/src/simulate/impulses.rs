@@ -31,13 +31,15 @@ pub(super) struct Impulses([Pending; 2]);
 impl Impulses {
     /// What a checkpoint keeps.
     pub(super) fn kept<B: Backend, F: ForceField<B>>(&self, system: &System<B, F>) -> Option<Kept<Vec<[f64; 3]>>> {
-        let impulse = system.touch.as_ref()?.impulse.as_ref()?;
+        let touch = system.touch.as_ref().filter(|touch| touch.is_recorded)?;
+        let still = || vec![[0.0; 3]; system.body.masses.len()];
+        let impulse = touch.impulse.as_ref().map_or_else(still, |impulse| system.backend.download(impulse));
         let pending = |k: usize| {
             let mut impulses = self.0[k].impulses.clone();
             impulses.resize(system.body.masses.len(), [0.0; 3]);
             impulses
         };
-        Some(([system.backend.download(impulse), pending(0), pending(1)], [self.0[0].since, self.0[1].since]))
+        Some(([impulse, pending(0), pending(1)], [self.0[0].since, self.0[1].since]))
     }
 
     /// Goes on with what a checkpoint kept, or from a time on where it kept nothing.

@@ -197,7 +197,7 @@ fn on_cpu<R: Precision>(
     let backend = CpuBackend::<R>::new(body);
     let field = CpuField::<R>::new(&backend, body);
     let (field, tangents, by) = match from.map(Checkpoint::tangents) {
-        Some(known) if known.len() == body.batches.len() => {
+        Some(known) if known.len() == body.batches.len() && !scene.solver.integrator.is_explicit() => {
             (field.with_tangents(known), known.to_vec(), ChosenBy::Checkpoint)
         }
         _ => setup::with_tangents(scene, body, &backend, field),

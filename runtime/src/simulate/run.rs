@@ -8,18 +8,19 @@ use serde_json::{Value, json};
 use crate::backend::{Backend, ForceField, LeftDomain};
 use crate::frames::{FrameData, Frames};
 use crate::guard::{Guards, LastStep};
+use crate::inventory::{Held, Inventory};
 use crate::model::Model;
 use crate::output::{OutputError, ProbeTable, create_folder, remove_file, write_json_atomic};
 use crate::plan::{Layout, Plan, integrator_name, precision_name};
 use crate::probe::{Energies, Needs, Snapshot};
 use crate::scene::{self, Scene};
-use crate::step_limit::{StepLimits, element_limit, power_limit};
+use crate::step_limit::StepLimits;
 use crate::system::{SolveError, State, StepReport, System};
 use crate::tangent::{ChosenBy, Tangent};
 
 use super::checkpoint::{Checkpoint, header};
 use super::impulses::{Impulses, Record};
-use super::setup::{Stepper, integrator, stepping};
+use super::setup::{Stepper, integrator, limits, stepping};
 use super::watch::Watch;
 use super::{Ending, Observer, Outcome, RunError, Sample};
 
@@ -42,6 +43,7 @@ pub(super) struct Run<'a, B: Backend, F: ForceField<B>> {
     /// Displacement and velocity before the last step, where its residual will be looked at.
     before_last: Option<[Vec<[f64; 3]>; 2]>,
     limits: Option<StepLimits>,
+    started: Instant,
     /// Steps whose states the observer wants.
     samples: Vec<u64>,
     watch: Watch,
@@ -53,12 +55,14 @@ pub(super) struct Run<'a, B: Backend, F: ForceField<B>> {
 
 impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
     pub(super) fn new(scene: &'a Scene, mut model: Model, backend: B, field: F, layout: Layout) -> Self {
-        let body = model.body.clone();
-        let integrator = integrator(scene, &backend, body.masses.len());
+        let started = Instant::now();
         let (seconds, steps) = stepping(scene);
-        let guards = Guards::new(&body, scene.solver.precision, steps);
-        let system = System::new(backend, field, body);
+        let guards = Guards::new(&model.body, scene.solver.precision, steps);
+        let mut system = System::new(backend, field, model.body.clone());
         let state = system.start(&model.start);
+        // First, so that steps take the memory that this leaves.
+        let limits = limits(scene, &mut system, &state, model.scale.time);
+        let integrator = integrator(scene, &system.backend);
         let mut warnings = std::mem::take(&mut model.warnings);
         warnings.extend(guards.before());
         let step = seconds / model.scale.time;
@@ -74,7 +78,8 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
             warnings,
             guards,
             before_last: None,
-            limits: None,
+            limits,
+            started,
             samples: vec![],
             watch: Watch::default(),
             impulses: Impulses::default(),
@@ -90,7 +95,6 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         from: Option<&Checkpoint>,
         observer: &mut (dyn Observer + Send),
     ) -> Result<Outcome, RunError> {
-        let started = Instant::now();
         if let Some(from) = from {
             from.check(self.scene, &self.model, self.step * self.model.scale.time, self.steps)?;
             let device = self.system.backend.name();
@@ -108,9 +112,9 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         if let Some(touch) = &mut self.system.touch
             && (of_frames || self.model.recorder.needs().contact)
         {
-            touch.impulse = Some(self.system.backend.zeros());
+            touch.is_recorded = true;
         }
-        self.measure_limits(observer);
+        self.tell_limits(observer);
         for warning in &self.warnings {
             observer.warning(warning);
         }
@@ -143,7 +147,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
             }
         }
         self.look_back(&ending, observer);
-        let summary = self.summary(&ending, &results, started.elapsed().as_secs_f64());
+        let summary = self.summary(&ending, &results, self.started.elapsed().as_secs_f64());
         if let Some(out) = out {
             write_json_atomic(&out.join("summary.json"), &summary)?;
             if let Ending::Failed(SolveError::LeftDomain(e)) = &ending {
@@ -225,7 +229,9 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         let doubtful =
             solver.precision == scene::Precision::F32 || is_static && self.guards.doubts(solver.newton.tolerance);
         if k == self.steps && !explicit && doubtful {
-            self.before_last = Some([&self.state.u, &self.state.v].map(|x| self.system.backend.download(x)));
+            let [u, v] = [Some(&self.state.u), self.state.v.as_ref()]
+                .map(|x| x.map(|x| self.system.backend.download(x)).unwrap_or_default());
+            self.before_last = Some([u, v]);
         }
         let mut stepped = self.integrator.step(&mut self.system, &mut self.state, self.step);
         if stepped.is_ok() && self.watch.missed(&mut self.system, &self.state, self.state.time, 1, self.step) {
@@ -286,8 +292,9 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         let mut header = header(self.scene, &self.model, device, [self.state.step, nodes], self.step * scale.time);
         header.integrator = self.integrator.memory();
         header.tangents = self.tangents.as_ref().map(|(tangents, _)| tangents.clone()).unwrap_or_default();
-        let mut vectors = vec![&self.state.u, &self.state.v];
-        let mut vectors: Vec<_> = vectors.drain(..).map(|x| self.system.backend.download(x)).collect();
+        let velocity = || vec![[0.0; 3]; self.system.body.masses.len()];
+        let of = |x: &B::Vector| self.system.backend.download(x);
+        let mut vectors = vec![of(&self.state.u), self.state.v.as_ref().map_or_else(velocity, of)];
         if let Some((impulses, recorded)) = self.impulses.kept(&self.system) {
             header.recorded = Some(recorded);
             vectors.extend(impulses);
@@ -298,7 +305,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
     /// Takes the state of a checkpoint, which was checked.
     fn go_on(&mut self, from: &Checkpoint) {
         self.state.u = self.system.backend.upload(&from.vectors[0]);
-        self.state.v = self.system.backend.upload(&from.vectors[1]);
+        self.state.v = self.system.body.moves.then(|| self.system.backend.upload(&from.vectors[1]));
         self.at(from.step());
         self.integrator.recall(&from.header.integrator);
         let kept = from.header.recorded.map(|recorded| ([2, 3, 4].map(|k| from.vectors[k].as_slice()), recorded));
@@ -308,7 +315,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
     /// Displacement and velocity, to come back to.
     fn copies(&self) -> [B::Vector; 2] {
         let backend = &self.system.backend;
-        [&self.state.u, &self.state.v].map(|x| {
+        [&self.state.u, self.state.velocity()].map(|x| {
             let mut copy = backend.zeros();
             backend.copy(x, &mut copy);
             copy
@@ -316,8 +323,9 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
     }
 
     fn restore(&mut self, [u, v]: &[B::Vector; 2]) {
-        self.system.backend.copy(u, &mut self.state.u);
-        self.system.backend.copy(v, &mut self.state.v);
+        for (copy, x) in [u, v].into_iter().zip(self.state.motion()) {
+            self.system.backend.copy(copy, x);
+        }
     }
 
     fn passed(&mut self, step: u64, report: StepReport) {
@@ -331,20 +339,11 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         self.state.time = self.step * step as f64;
     }
 
-    /// Measures the critical steps and warns of a step above them.
-    fn measure_limits(&mut self, observer: &mut (dyn Observer + Send)) {
-        if self.scene.solver.integrator == scene::Integrator::Static {
-            return;
-        }
-        let unit = self.model.scale.time;
-        let element = element_limit(&self.system.body);
-        let mut u = self.system.backend.zeros();
-        self.system.backend.copy(&self.state.u, &mut u);
-        let power = power_limit(&mut self.system, &u);
-        let limits = StepLimits { element: element * unit, power: power * unit };
-        self.limits = Some(limits);
+    /// Tells the critical steps and warns of a step above them.
+    fn tell_limits(&mut self, observer: &mut (dyn Observer + Send)) {
+        let Some(limits) = self.limits else { return };
         observer.limits(limits);
-        let step = self.step * unit;
+        let step = self.step * self.model.scale.time;
         if self.scene.solver.integrator.is_explicit() {
             self.guards.step(step, limits);
         }
@@ -455,8 +454,8 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         if needs.reactions {
             let mut f = self.system.backend.zeros();
             self.system.force(&self.state.u, self.state.time, &mut f)?;
-            if self.scene.solver.integrator != scene::Integrator::Static {
-                self.system.add_damping(&self.state.u, &self.state.v, &mut f);
+            if let Some(v) = &self.state.v {
+                self.system.add_damping(&self.state.u, v, &mut f);
             }
             snapshot.reactions = self.in_si(&f, -scale.force());
         }
@@ -475,11 +474,12 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
 
     fn frame(&mut self, needs: Needs) -> Result<FrameData, SolveError> {
         let scale = self.model.scale;
-        let mut data = FrameData {
-            displacement: self.in_si(&self.state.u, scale.length),
-            velocity: self.in_si(&self.state.v, scale.velocity()),
-            ..FrameData::default()
-        };
+        let mut data = FrameData { displacement: self.in_si(&self.state.u, scale.length), ..FrameData::default() };
+        if needs.velocity {
+            let still = || vec![[0.0; 3]; self.model.mesh.nodes().len()];
+            let v = self.state.v.as_ref();
+            data.velocity = v.map_or_else(still, |v| self.in_si(v, scale.velocity()));
+        }
         if needs.stresses {
             data.stresses = self.stresses();
         }
@@ -518,7 +518,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         let elastic = field.potential_energy(backend, &self.state.u)?;
         let unit = self.model.scale.energy();
         Ok(Energies {
-            kinetic: self.system.kinetic_energy(&self.state.v) * unit,
+            kinetic: self.state.v.as_ref().map_or(0.0, |v| self.system.kinetic_energy(v) * unit),
             elastic: elastic * unit,
             external: -self.system.load_work(&self.state.u, self.state.time) * unit,
         })
@@ -580,6 +580,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
             "guards": self.guards.to_json(),
             "contact": self.system.touch.as_ref().map(|touch| json!({ "steps_that_looked": touch.steps })),
             "device_counts": self.device_counts(),
+            "inventory": self.inventory(),
             "units": { "length_m": scale.length, "stress_Pa": scale.stress, "time_s": scale.time },
             "model": plan.to_json(),
             "warnings": self.warnings,
@@ -594,6 +595,21 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
                 "dispatches": counts.dispatches, "submissions": counts.submissions,
                 "readbacks": counts.readbacks, "bytes_read": counts.bytes_read,
             })
+        })
+    }
+
+    /// What was held at most and is at the end, and what ran how often.
+    fn inventory(&self) -> Value {
+        let Inventory { buffers, all, kernels } = self.system.backend.ledger().inventory();
+        let of = |bytes: fn(&Held) -> usize| -> serde_json::Map<String, Value> {
+            let some = buffers.iter().filter(|(_, held)| bytes(held) > 0);
+            some.map(|(name, held)| (name.clone(), json!(bytes(held)))).collect()
+        };
+        let runs: serde_json::Map<String, Value> =
+            kernels.into_iter().map(|(name, used)| (name, json!(used.runs))).collect();
+        json!({
+            "allocated_bytes": all.peak, "buffers_bytes": of(|held| held.peak), "held_bytes": of(|held| held.bytes),
+            "kernel_runs": runs,
         })
     }
 

@@ -6,7 +6,8 @@ use crate::cg::CgLimits;
 use crate::cpu::{CpuBackend, CpuField, Precision, fastest};
 use crate::integrate::{CentralDifference, ImplicitEuler, NewtonLimits, SemiImplicitEuler, SolverSettings, Statics};
 use crate::scene::{self, Scene};
-use crate::system::Integrator;
+use crate::step_limit::{StepLimits, element_limit, power_limit};
+use crate::system::{Integrator, State, System};
 use crate::tangent::{self, ChosenBy, Tangent};
 
 /// An integrator on a backend.
@@ -48,11 +49,30 @@ fn ramps_end(scene: &Scene) -> f64 {
     loads.chain(motions).fold(0.0, f64::max)
 }
 
+/// The critical steps of a body at its initial state in s, where its unit of time is so many; none in statics. What explicit
+/// steps do not need of it is let go.
+pub(super) fn limits<B: Backend, F: ForceField<B>>(
+    scene: &Scene,
+    system: &mut System<B, F>,
+    state: &State<B>,
+    unit: f64,
+) -> Option<StepLimits> {
+    if !system.body.moves {
+        return None;
+    }
+    let limits = [element_limit(&system.body), power_limit(system, &state.u)].map(|limit| limit * unit);
+    if scene.solver.integrator.is_explicit() {
+        system.field.forget_tangent(&system.backend);
+        system.backend.trim();
+    }
+    let [element, power] = limits;
+    Some(StepLimits { element, power })
+}
+
 /// The integrator that a scene asks for.
 pub(super) fn integrator<B: Backend + 'static, F: ForceField<B> + 'static>(
     scene: &Scene,
     backend: &B,
-    nodes: usize,
 ) -> Stepper<B, F> {
     let solver = &scene.solver;
     let settings = SolverSettings {
@@ -61,10 +81,10 @@ pub(super) fn integrator<B: Backend + 'static, F: ForceField<B> + 'static>(
         newton: NewtonLimits { tolerance: solver.newton.tolerance, max_iterations: solver.newton.max_iterations },
     };
     match solver.integrator {
-        scene::Integrator::ImplicitEuler => Box::new(ImplicitEuler::new(backend, nodes, settings)),
+        scene::Integrator::ImplicitEuler => Box::new(ImplicitEuler::new(backend, settings)),
         scene::Integrator::SemiImplicitEuler => Box::new(SemiImplicitEuler::new(backend)),
         scene::Integrator::CentralDifference => Box::new(CentralDifference::new(backend)),
-        scene::Integrator::Static => Box::new(Statics::new(backend, nodes, settings)),
+        scene::Integrator::Static => Box::new(Statics::new(backend, settings)),
     }
 }
 
@@ -76,7 +96,12 @@ pub(super) fn with_tangents<R: Precision>(
     field: CpuField<R>,
 ) -> (CpuField<R>, Vec<Tangent>, ChosenBy) {
     let (tangents, by) = tangent::asked_for(scene, body);
-    if scene.solver.integrator.is_explicit() || scene.solver.cg.tangent != scene::TangentChoice::Measured {
+    if scene.solver.integrator.is_explicit() {
+        // The critical step alone asks for products: it stores nothing.
+        let field = field.with_tangents(&vec![Tangent::Recomputed; tangents.len()]);
+        return (field, tangents, by);
+    }
+    if scene.solver.cg.tangent != scene::TangentChoice::Measured {
         return (field.with_tangents(&tangents), tangents, by);
     }
     // What is asked for is speed: digits are not given up for it.

@@ -86,7 +86,7 @@ impl Watch {
     /// Asks for the greatest speed, at a time.
     fn ask<B: Backend, F: ForceField<B>>(&mut self, system: &System<B, F>, state: &State<B>, now: f64) {
         // Of three components the greatest is no less than the length by this.
-        let speed = 3.0_f64.sqrt() * system.backend.max_abs(&state.v);
+        let speed = 3.0_f64.sqrt() * system.backend.max_abs(state.velocity());
         let time = now - self.asked;
         self.acceleration = if time > 0.0 { (speed - self.speed).abs() / time } else { 0.0 };
         (self.speed, self.asked) = (speed, now);

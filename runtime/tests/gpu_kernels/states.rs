@@ -79,6 +79,7 @@ pub fn body(elements: Rows<u32>, rest: &Rows<RestPoint<f64>>, batches: Vec<LawBa
         loads: vec![],
         pressures: vec![],
         contact: None,
+        moves: true,
         mass_damping: 0.0,
         stiffness_damping: 0.0,
         diameter: 1.0,

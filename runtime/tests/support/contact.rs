@@ -92,7 +92,7 @@ pub fn implicit(scene: &Scene) -> OnCpu<f64> {
         preconditioner: Preconditioner::Jacobi,
         newton: NewtonLimits { tolerance: 1e-8, max_iterations: 30 },
     };
-    bench.integrator = Box::new(ImplicitEuler::new(&bench.system.backend, bench.system.body.masses.len(), settings));
+    bench.integrator = Box::new(ImplicitEuler::new(&bench.system.backend, settings));
     bench
 }
 
@@ -130,11 +130,11 @@ impl<B: Backend + 'static, F: ForceField<B> + 'static> Bench<B, F> {
     pub fn step(&mut self) -> [f64; 2] {
         self.system.touch.as_mut().expect("an obstacle").is_looked_for = false;
         self.integrator.step(&mut self.system, &mut self.state, self.h).unwrap_or_else(|e| panic!("{e}"));
-        let before = self.system.kinetic_energy(&self.state.v);
+        let before = self.system.kinetic_energy(self.state.velocity());
         self.system.touch.as_mut().expect("an obstacle").is_looked_for = true;
         self.system.meet_obstacles(&mut self.state, self.h);
         self.state.step += 1;
         self.state.time = self.h * self.state.step as f64;
-        [before, self.system.kinetic_energy(&self.state.v)]
+        [before, self.system.kinetic_energy(self.state.velocity())]
     }
 }

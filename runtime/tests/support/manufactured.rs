@@ -179,7 +179,7 @@ pub fn solve(element: &'static ElementEntry, law: &'static LawEntry, cells: usiz
         newton: NewtonLimits { tolerance: 1e-11, max_iterations: 30 },
     };
     let mut state = system.initial_state([0.0; 3]);
-    let mut statics = Statics::new(&system.backend, mesh.nodes().len(), settings);
+    let mut statics = Statics::new(&system.backend, settings);
     statics
         .step(&mut system, &mut state, 1.0)
         .unwrap_or_else(|e| panic!("{}, {}: {e}", element.info.name, law.info.name));

@@ -250,6 +250,7 @@ pub fn body(mesh: &Mesh, law: &'static LawEntry, parameters: &[f64], imposed: &[
         loads: vec![],
         pressures: vec![],
         contact: None,
+        moves: true,
         mass_damping: 0.0,
         stiffness_damping: 0.0,
         diameter: (0..3).map(|i| (high[i] - low[i]).powi(2)).sum::<f64>().sqrt(),
