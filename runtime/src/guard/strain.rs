@@ -117,7 +117,7 @@ impl Strains {
 
     /// Values and thresholds.
     pub(super) fn to_json(&self) -> [Value; 2] {
-        let trusted: Vec<Value> = self.trusted.iter().map(Trusted::to_json).collect();
+        let trusted: Vec<Value> = self.trusted.iter().map(|trusted| trusted.to_json()).collect();
         [json!(self.linear.map(|linear| linear.to_json())), json!(trusted)]
     }
 }
@@ -161,7 +161,7 @@ impl Linear {
         }
         let (degrees, strain) = (self.rotation.value.to_degrees(), 100.0 * self.strain.value);
         Some(format!(
-            "law `{}` is linear and takes rotation for strain: at {:.4} s displacements are wrong by about {:.0} %, strains by more (rotations up to \
+            "law `{}` is linear and holds for small rotations and strains only: at {:.4} s displacements are wrong by about {:.0} %, strains by more (rotations up to \
              {degrees:.0} degrees, strains up to {strain:.1} %); {}",
             self.law.name,
             self.time,
@@ -252,7 +252,7 @@ impl Trusted {
         ))
     }
 
-    fn to_json(&self) -> Value {
+    fn to_json(self) -> Value {
         json!({
             "law": self.law.name, "range": [self.range.0, self.range.1],
             "least": self.least.to_json(), "greatest": self.greatest.to_json(),
