@@ -48,6 +48,8 @@ pub struct Ran {
     pub reaction: Option<f64>,
     /// What it warned of.
     pub warnings: Vec<String>,
+    /// The error of displacements that it estimates itself.
+    pub estimate: Option<f64>,
 }
 
 /// Runs a specimen in some units.
@@ -59,7 +61,7 @@ pub fn run(
     tolerances: Tolerances,
     (folder, longest): (&Path, Duration),
 ) -> Ran {
-    let mut ran = Ran { end: End::Done, looks: vec![], reaction: None, warnings: vec![] };
+    let mut ran = Ran { end: End::Done, looks: vec![], reaction: None, warnings: vec![], estimate: None };
     let scene = match specimen.scene(units, precision, tolerances, folder) {
         Ok(scene) => scene,
         Err(e) => return Ran { end: End::Refused(first_line(&e.to_string())), ..ran },
@@ -73,6 +75,7 @@ pub fn run(
     ran.looks = watch.samples.into_iter().map(|s| look(s, units.length, energy)).collect();
     ran.reaction = outcome.probes.first().map(|(_, _, value)| value / (units.stress * units.length * units.length));
     ran.warnings = outcome.warnings;
+    ran.estimate = outcome.summary["guards"]["residual"]["estimated_error"].as_f64();
     ran.end = match outcome.ending {
         Ending::Done => End::Done,
         Ending::Failed(e) => End::Stopped(e.to_string()),

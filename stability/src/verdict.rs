@@ -1,5 +1,6 @@
 //! What came of a specimen.
 
+use tensormass_runtime::mesh::{Mesh, NodeId};
 use tensormass_runtime::scene::Precision;
 
 use crate::reference::Reference;
@@ -34,21 +35,19 @@ fn right(precision: Precision) -> f64 {
     }
 }
 
-/// The part of its energy that a body may lose or gain in a drift.
-fn kept(precision: Precision) -> f64 {
-    match precision {
-        Precision::F32 => 1e-2,
-        Precision::F64 => 1e-3,
-    }
-}
+/// The part of its energy that a body may lose or gain in a drift. Energies of explicit steps of a tenth of the critical one, 2 / omega,
+/// swing by up to (omega h)^2 / 4 of what the stiffest mode has.
+const KEPT: f64 = 1e-2;
+/// An error that a run estimates itself may be so many times greater.
+const ESTIMATED: f64 = 3.0;
 
-/// Judges a run of a specimen whose nodes are at `rest`, in units of length; `unsolved` is by how much of their terms its states miss
+/// Judges a run of a specimen that is `rest` at rest, in units of length; `unsolved` is by how much of their terms its states miss
 /// the equations of equilibrium.
 pub fn judge(
     ran: &Ran,
     reference: &Reference,
-    rest: &[[f64; 3]],
-    (precision, is_explicit): (Precision, bool),
+    rest: &Mesh,
+    (precision, keeps_energy): (Precision, bool),
     unsolved: impl FnOnce() -> Option<f64>,
 ) -> Verdict {
     let finite = |look: &Look| look.displacement.iter().flatten().all(|x| x.is_finite());
@@ -61,11 +60,11 @@ pub fn judge(
         End::Unfinished => return Verdict::Unfinished,
         End::Done => {}
     }
-    let limit = if matches!(reference, Reference::Energy) { kept(precision) } else { right(precision) };
+    let limit = if matches!(reference, Reference::Energy) { KEPT } else { right(precision) };
     let error = match reference {
-        Reference::Exact { stretches, reaction, energy } => exact(ran, rest, *stretches, [*reaction, *energy]),
+        Reference::Exact { stretches, reaction, energy } => exact(ran, rest.nodes(), *stretches, [*reaction, *energy]),
         Reference::Twin(looks) => apart(&ran.looks, looks),
-        Reference::Energy => drift(&ran.looks, is_explicit),
+        Reference::Energy => drift(&ran.looks, keeps_energy),
         Reference::None(why) => {
             return told(ran).map_or_else(|| Verdict::Unjudged(why.clone()), |t| Verdict::Told(f64::NAN, t));
         }
@@ -73,6 +72,10 @@ pub fn judge(
             return Verdict::Wrong(*off, "the twin in f64 does not solve its equations".into());
         }
     };
+    let is_inverted = ran.looks.iter().any(|look| inverted(rest, &look.displacement));
+    if is_inverted && !ran.warnings.iter().any(|w| w.contains("inside out")) {
+        return Verdict::Wrong(error, "elements are inside out, and nothing says so".into());
+    }
     if error <= limit {
         return Verdict::Right(error);
     }
@@ -81,15 +84,31 @@ pub fn judge(
     {
         return Verdict::Other(off);
     }
-    match told(ran) {
+    let estimated = ran.estimate.filter(|estimate| ESTIMATED * estimate >= error);
+    let estimated = estimated.map(|_| "the estimate of the error in summary.json".to_string());
+    match told(ran).or(estimated) {
         Some(warning) => Verdict::Told(error, warning),
         None => Verdict::Wrong(error, "nothing says so".into()),
     }
 }
 
-/// A warning that the results may be off.
+/// A warning that the results may be off: not of what is only slow, nor of what elements are whatever happens.
 fn told(ran: &Ran) -> Option<String> {
-    ran.warnings.iter().find(|w| !w.contains("software device") && !w.contains("is a sliver")).cloned()
+    let others = ["software device", "is a sliver", "lock where volume"];
+    ran.warnings.iter().find(|w| !others.iter().any(|other| w.contains(other))).cloned()
+}
+
+/// Whether a tetrahedron is inside out, by more than roundings.
+fn inverted(rest: &Mesh, u: &[[f64; 3]]) -> bool {
+    let volume = |x: &dyn Fn(usize) -> [f64; 3], nodes: &[NodeId; 4]| {
+        let [a, b, c, d] = nodes.map(|n| x(n.index()));
+        let edge = |p: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| p[i] - a[i]) };
+        let ([p, q, r], [s, t, v], [l, m, n]) = (edge(b), edge(c), edge(d));
+        p * (t * n - v * m) - q * (s * n - v * l) + r * (s * m - t * l)
+    };
+    let at_rest = |n: usize| rest.nodes()[n];
+    let moved = |n: usize| -> [f64; 3] { std::array::from_fn(|i| rest.nodes()[n][i] + u[n][i]) };
+    rest.tets().iter().any(|nodes| volume(&moved, nodes) < -1e-6 * volume(&at_rest, nodes))
 }
 
 fn exact(ran: &Ran, rest: &[[f64; 3]], stretches: [f64; 3], [reaction, energy]: [f64; 2]) -> f64 {
@@ -115,9 +134,9 @@ fn apart(found: &[Look], wanted: &[Look]) -> f64 {
     if off == 0.0 { 0.0 } else { off / size }
 }
 
-/// The part of its energy that a body has gained, or lost too if steps are explicit ones.
-fn drift(looks: &[Look], is_explicit: bool) -> f64 {
+/// The part of its energy that a body has gained, or lost too if nothing dissipates.
+fn drift(looks: &[Look], keeps_energy: bool) -> f64 {
     let (Some(first), Some(last)) = (looks.first(), looks.last()) else { return f64::INFINITY };
     let gained = (last.energy - first.energy) / first.energy.abs();
-    if is_explicit { gained.abs() } else { gained.max(0.0) }
+    if keeps_energy { gained.abs() } else { gained.max(0.0) }
 }

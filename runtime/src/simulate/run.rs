@@ -422,6 +422,13 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         }
         if *ending == Ending::Done {
             self.judge_residual();
+            let energies = self.energies();
+            if energies.is_ok_and(|e| !e.total().is_finite()) {
+                self.warnings.push(format!(
+                    "the energy is beyond what {} holds; displacements are right all the same",
+                    precision_name(self.scene.solver.precision)
+                ));
+            }
         }
         // States of a simulation that blew up say nothing of its laws.
         if !matches!(ending, Ending::Failed(SolveError::Diverged { .. })) {
