@@ -1,6 +1,7 @@
 //! `tensormass bench`: how many elements a second kernels and steps compute on this machine.
 
 mod baseline;
+mod omissions;
 mod report;
 mod roofline;
 
@@ -50,6 +51,10 @@ pub struct Arguments {
     /// Measure an implicit step too: with and without a preconditioner, and its parts.
     #[arg(long, conflicts_with = "baseline")]
     implicit: bool,
+    /// Measure instead what it gains to leave out what a scene does not require: steps of scenes with something and without
+    /// it, in turn.
+    #[arg(long, conflicts_with_all = ["baseline", "implicit", "mesh", "laws", "stiffness_ratio", "tangent", "roofline"])]
+    omissions: bool,
     /// How many times stiffer the material is in one half of the beam than in the other.
     #[arg(long, value_name = "RATIO", default_value_t = 1.0, value_parser = ratio)]
     stiffness_ratio: f64,
@@ -124,6 +129,9 @@ pub fn call(arguments: &Arguments) -> Result<(), Failure> {
             .ok_or_else(|| unknown("element", name, solids().map(|e| e.info.name)))?,
     };
     let bench = Bench::new(arguments.threads as usize).map_err(failed)?;
+    if arguments.omissions {
+        return omissions::call(arguments, &bench, element);
+    }
     let mut bodies: Vec<Body> = arguments.cells.iter().map(|&cells| Body::Beam(cells)).collect();
     for file in &arguments.mesh {
         // A scene takes files as relative to its own place.
@@ -255,6 +263,7 @@ fn failed(error: MeasureError) -> Failure {
         MeasureError::Build(_) | MeasureError::Device(_) | MeasureError::Kind { .. } | MeasureError::Threads { .. } => {
             Failure::bad_input(error.to_string())
         }
+        MeasureError::Run(error) => Failure::bad_input(error.to_string()),
         MeasureError::LeftDomain(_) | MeasureError::Step(_) => Failure::Simulation(error.to_string()),
     }
 }

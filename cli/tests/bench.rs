@@ -203,3 +203,44 @@ fn a_baseline_is_measured_in_turn() {
     assert_eq!((status, err.as_str()), (Some(0), ""));
     assert!(text.starts_with("speed as a multiple of the other's: medians of 1 rounds in turn"), "{text}");
 }
+
+/// What omissions gain is measured in turn: scenes with something run what those without do not, and never hold less.
+#[test]
+fn omissions_are_measured_in_turn() {
+    let arguments = ["--omissions", "--cells", "5x1x1", "--repeats", "2", "--device", "cpu"];
+    let found = json(&arguments);
+    let measured = found["omissions"][0]["measured"].as_array().expect("a list");
+    let of = |name: &str| measured.iter().find(|m| m["name"] == name).unwrap_or_else(|| panic!("no {name}"));
+    for one in measured {
+        for side in ["with", "without"] {
+            let seconds = one[side]["step_seconds"].as_array().expect("a list");
+            assert!(seconds.len() == 2 && seconds.iter().all(|s| number(s) > 0.0), "{one}");
+            assert!(number(&one[side]["allocated_bytes"]) > 0.0, "{one}");
+        }
+        assert!(number(&one["ratio"]) > 0.0);
+    }
+    let kernels = |name: &str| of(name)["with"]["own_kernels"].to_string();
+    for (name, kernel) in [
+        ("contact", "contact"),
+        ("contact while the gap cannot close", "contact"),
+        ("viscosity, explicit", "damping"),
+        ("viscosity, implicit", "ddamping"),
+        ("stiffness damping, explicit", "dforce"),
+        ("consistent masses, implicit", "consistent mass"),
+        ("a probe of stresses in each step", "cauchy"),
+    ] {
+        assert!(kernels(name).contains(kernel), "{name}: {}", kernels(name));
+    }
+    let bytes = |name: &str, side: &str| number(&of(name)[side]["allocated_bytes"]);
+    for name in [
+        "double precision",
+        "velocities and inertia (static)",
+        "a direction for each element",
+        "the tangent (explicit)",
+    ] {
+        assert!(bytes(name, "with") > bytes(name, "without"), "{name}");
+    }
+    let (status, out, err) = call(&arguments);
+    assert_eq!(status, Some(0), "{err}");
+    assert!(out.contains("what is left out") && out.contains("while the gap cannot close"), "{out}");
+}

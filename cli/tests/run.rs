@@ -272,5 +272,29 @@ fn plan_says_what_is_computed_and_what_is_left_out() {
     assert!(on_gpu["bytes_per_element"].as_f64() > on_cpu["bytes_per_element"].as_f64(), "{on_gpu}");
     assert_eq!(on_gpu["passes"].to_string().matches("CG iteration").count(), 6, "{on_gpu}");
     let left_out = explicit["left_out"].to_string();
-    assert!(left_out.contains("tangent stiffness") && left_out.contains("contact: no obstacle"), "{left_out}");
+    for what in ["tangent stiffness", "contact: no obstacle", "fibres: no law has a direction", "stresses of elements"]
+    {
+        assert!(left_out.contains(what), "{what}: {left_out}");
+    }
+    // What passes compute and move: an explicit step has no solution and no iterations.
+    let total = |plan: &Value, per: &str, what: &str| plan["totals"][per][what].as_f64().expect("a total");
+    for what in ["flops_per_element", "bytes_per_element"] {
+        let of_passes: f64 =
+            implicit["passes"].as_array().expect("passes").iter().filter_map(|p| p[what].as_f64()).sum();
+        let of_totals: f64 =
+            ["step", "solution", "iteration", "record"].map(|per| total(&implicit, per, what)).iter().sum();
+        assert!((of_passes - of_totals).abs() <= 1e-9 * of_totals, "{what}: {of_passes} for {of_totals}");
+        assert!(total(&explicit, "step", what) > 0.0 && total(&implicit, "iteration", what) > 0.0);
+        assert_eq!(total(&explicit, "solution", what) + total(&explicit, "iteration", what), 0.0);
+    }
+    let vectors = |plan: &Value| plan["vectors"]["in_steps"].as_u64().expect("a number");
+    let still = plan(&["--set", "solver.integrator=static"]);
+    assert!(vectors(&explicit) < vectors(&implicit));
+    assert!(still["left_out"].to_string().contains("velocities"), "{still}");
+    // As text: each pass with what it computes and moves, and what is left out.
+    let (status, text, err) = parts(&case.command(&["plan", "beam.toml"]).output().expect("the binary starts"));
+    assert_eq!(status, Some(0), "{err}");
+    for what in ["passes of each step", "passes of each linear solution", "vectors over the nodes", "left out"] {
+        assert!(text.contains(what), "{what}: {text}");
+    }
 }

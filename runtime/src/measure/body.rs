@@ -8,7 +8,7 @@ use crate::model::Model;
 use crate::plan::precision_name;
 
 /// A parameter in the middle of its range where it has no default, of a material so many times stiffer than that.
-fn parameter(p: &ParameterInfo, stiffer: f64) -> String {
+pub(super) fn parameter(p: &ParameterInfo, stiffer: f64) -> String {
     let (low, high) = p.range;
     let middle = if low > 0.0 { (low * high).sqrt() } else { 0.5 * (low + high) };
     // The middle of a direction's components would be none.

@@ -6,6 +6,7 @@
 mod body;
 mod count;
 mod implicit;
+mod omissions;
 mod operations;
 mod peak;
 
@@ -21,6 +22,7 @@ use crate::gpu::{GpuBackend, GpuField};
 use crate::model::{BuildError, Model, build};
 use crate::order::sharing;
 use crate::scene::{self, SceneError};
+use crate::simulate::RunError;
 use crate::system::SolveError;
 use crate::tangent::{Tangent, asked_for, blocks};
 use crate::target::Target;
@@ -28,6 +30,7 @@ use crate::target::Target;
 pub use body::{cells, scene_text, wave};
 use count::Layout;
 pub use implicit::{Implicit, STEP, Solution, TOLERANCE};
+pub use omissions::{Omission, Setting, Side};
 
 /// Iterations of the linear solver in one of its figures.
 pub const ITERATIONS: u32 = 50;
@@ -85,6 +88,9 @@ pub enum MeasureError {
     /// A step failed.
     #[error(transparent)]
     Step(#[from] SolveError),
+    /// A scene cannot be run.
+    #[error(transparent)]
+    Run(#[from] RunError),
     /// The threads cannot be started.
     #[error("{threads} threads cannot be started: {reason}; ask for fewer")]
     Threads {
@@ -180,6 +186,14 @@ impl Bench {
     /// See [`MeasureError`].
     pub fn measure(&self, target: &Target, subject: &Subject) -> Result<Measured, MeasureError> {
         self.pool.install(|| on(target, subject, Operations))
+    }
+
+    /// Measures what it gains to leave out what scenes may leave out.
+    ///
+    /// # Errors
+    /// See [`MeasureError`].
+    pub fn omissions(&self, target: &Target, setting: &Setting) -> Result<Vec<Omission>, MeasureError> {
+        omissions::omissions(target, setting)
     }
 
     /// Measures an implicit step of a subject on a device.
