@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use tensormass_runtime::model::{BuildError, Model, build};
+use tensormass_runtime::moduli::moduli;
 use tensormass_runtime::scene::{Integrator, Mesh, Override, Parameter, ParameterValue, Scene, SceneError, load};
 use tensormass_runtime::step_limit::element_limit;
 use tensormass_runtime::{elements, laws};
@@ -287,7 +288,7 @@ fn law_choices(scene: &Scene, model: &Model) -> (Vec<Choice>, usize) {
                 (None, Some(default)) => values.extend(default),
             }
         }
-        twins::moduli(law, &law.constants(&values))
+        moduli(law, &law.constants(&values))
     };
     let mut choices = vec![Choice { name: own.join(" + "), changes: vec![] }];
     let moduli: Option<Vec<[f64; 2]>> = scene.material.iter().map(of_material).collect();

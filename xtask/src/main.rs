@@ -1,5 +1,6 @@
 //! Development tasks, called as `cargo xtask TASK`. Links no crate of the project, so that none can break it.
 
+mod extremes;
 mod law;
 mod process;
 mod reproduce;
@@ -14,6 +15,8 @@ Usage: cargo xtask TASK
 Tasks:
   law accept NAME    write the derivation, snapshots and SymPy values of laws/NAME.rs, for review and commit
   law unreviewed     fail if a committed law has no committed derivation that fits its text
+  extremes [--planted]
+                     drive whole scenes to extremes, write docs/stability.md; with planted faults, which the suite has to find
   reproduce tables-1-2 [--device cpu|cpu,gpu]
                      run the paper's traction test and its experiments, write docs/reproduction.md (some minutes)
   reproduce extremes measure the accuracy of every law, write docs/extremes.md
@@ -36,6 +39,7 @@ fn call(arguments: &[&str]) -> Result<(), Failure> {
     match arguments {
         ["law", "accept", name] => law::accept::call(name),
         ["law", "unreviewed"] => law::unreviewed::call(),
+        ["extremes", options @ ..] => extremes::call(options),
         ["reproduce", "tables-1-2", options @ ..] => reproduce::call(options),
         ["reproduce", "extremes"] => reproduce::extremes::call(),
         ["reproduce", "accuracy"] => reproduce::accuracy::call(),

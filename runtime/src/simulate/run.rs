@@ -124,7 +124,12 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
                 self.go_on(from);
                 Ok(())
             }
-            None => self.record(&mut results, observer)?,
+            None => {
+                if self.model.start.displacement.is_some() {
+                    self.look();
+                }
+                self.record(&mut results, observer)?
+            }
         };
         let ending = match begun {
             Err(e) => Ending::Failed(e),
