@@ -1,4 +1,4 @@
-//! Errors of every element against the size of its mesh, as CSV: what docs/accuracy.md is made of.
+//! Errors of every element against the size of its mesh, as CSV: what docs/convergence.md is made of.
 //!
 //! Manufactured solutions for a linear and a finite law, the deflection of the cantilever CANTI_SMALL, and frequencies of a
 //! bar with consistent and with lumped masses, in the places of displacement and energy.

@@ -1,8 +1,10 @@
 //! All cells of the suite: each extreme, value and law, with each integrator, precision and device.
 
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use rayon::prelude::*;
 use tensormass_lawbench::material::{Material, Moduli, names};
 use tensormass_lawbench::subject::Subject;
 use tensormass_runtime::device::DeviceChoice;
@@ -36,17 +38,19 @@ pub struct Place {
     pub target: Target,
     /// The precision.
     pub precision: Precision,
+    /// Whether all laws are computed there, or one of each kind.
+    pub every_law: bool,
 }
 
 impl Place {
     /// The CPU in both precisions, and a GPU if there is one.
     pub fn all() -> Vec<Self> {
         let mut places = vec![
-            Self { name: "f64", target: Target::Cpu, precision: Precision::F64 },
-            Self { name: "f32", target: Target::Cpu, precision: Precision::F32 },
+            Self { name: "f64", target: Target::Cpu, precision: Precision::F64, every_law: true },
+            Self { name: "f32", target: Target::Cpu, precision: Precision::F32, every_law: true },
         ];
         if let Ok(target) = Target::open(&DeviceChoice::Gpu, Precision::F32) {
-            places.push(Self { name: "GPU", target, precision: Precision::F32 });
+            places.push(Self { name: "GPU", target, precision: Precision::F32, every_law: false });
         }
         places
     }
@@ -96,18 +100,11 @@ impl Choice {
     /// What takes a minute or two: one law of each kind, and the ends of each range, on the CPU.
     pub fn short() -> Self {
         let mut all = Self::all();
+        all.laws = one_of_each_kind(&all.laws);
         all.places.retain(|place| place.name != "GPU");
-        let kind = |law: &LawEntry| {
-            let info = law.info;
-            (info.structure.linear, info.domain.is_some(), info.structure.isotropic, law.damping.is_some())
-        };
-        let mut choice = Self { laws: vec![], questions: vec![], ..all };
-        for law in all.laws {
-            if !choice.laws.iter().any(|other| kind(other) == kind(law)) {
-                choice.laws.push(law);
-            }
-        }
-        for (extreme, values) in all.questions {
+        let all_questions = std::mem::take(&mut all.questions);
+        let mut choice = all;
+        for (extreme, values) in all_questions {
             let mut ends = vec![values[0], values[values.len() / 2], values[values.len() - 1]];
             ends.dedup();
             // A hundred thousand steps are for the whole suite.
@@ -125,26 +122,41 @@ impl Choice {
         for (extreme, values) in &self.questions {
             each.extend(values.iter().flat_map(|value| self.laws.iter().map(|law| (*extreme, *value, *law))));
         }
-        let of = |(extreme, value, law): &(Extreme, f64, &'static LawEntry)| {
-            let cells = self.cells(*extreme, *value, law);
-            done(&cells);
-            cells
+        // Threads of our own: runs have pools of theirs, and a pool that waits for another takes up more work meanwhile.
+        let (next, found) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
+        let work = || {
+            while let Some((k, (extreme, value, law))) = {
+                let k = next.fetch_add(1, Ordering::Relaxed);
+                each.get(k).map(|one| (k, *one))
+            } {
+                let cells = self.cells(extreme, value, law);
+                done(&cells);
+                found.lock().unwrap_or_else(PoisonError::into_inner).insert(k, cells);
+            }
         };
-        each.par_iter().flat_map_iter(of).collect()
+        std::thread::scope(|scope| {
+            for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+                scope.spawn(work);
+            }
+        });
+        let found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
+        found.into_values().flatten().collect()
     }
 
     fn cells(&self, extreme: Extreme, value: f64, law: &'static LawEntry) -> Vec<Cell> {
         let subject = Subject::of_build(law);
+        let is_one_of_its_kind = one_of_each_kind(&self.laws).iter().any(|one| one.info.name == law.info.name);
+        let places: Vec<&Place> = self.places.iter().filter(|p| p.every_law || is_one_of_its_kind).collect();
         let poisson = if extreme == Extreme::Poisson { value } else { 0.3 };
         let integrators = INTEGRATORS.iter().enumerate().filter(|(_, (integrator, _, _))| extreme.asks(*integrator));
         let mut cells = vec![];
         for (k, (integrator, linearised, _)) in integrators {
             let verdicts = match material(&subject, poisson) {
                 Ok(material) => match extreme.specimen(value, law, &material, (*integrator, *linearised)) {
-                    Ok(specimen) => self.verdicts(extreme, &specimen, &subject),
-                    Err(why) => vec![Verdict::Refused(first_line(&why)); self.places.len()],
+                    Ok(specimen) => self.verdicts(extreme, &specimen, &subject, &places),
+                    Err(why) => vec![Verdict::Refused(first_line(&why)); places.len()],
                 },
-                Err(why) => vec![Verdict::Unjudged(why); self.places.len()],
+                Err(why) => vec![Verdict::Unjudged(why); places.len()],
             };
             let cell = |(place, verdict): (&Place, Verdict)| Cell {
                 extreme,
@@ -154,31 +166,52 @@ impl Choice {
                 place: place.name,
                 verdict,
             };
-            cells.extend(self.places.iter().zip(verdicts).map(cell));
+            cells.extend(places.iter().copied().zip(verdicts).map(cell));
         }
         cells
     }
 
-    fn verdicts(&self, extreme: Extreme, specimen: &Specimen<'_>, subject: &Subject) -> Vec<Verdict> {
+    fn verdicts(
+        &self,
+        extreme: Extreme,
+        specimen: &Specimen<'_>,
+        subject: &Subject,
+        places: &[&Place],
+    ) -> Vec<Verdict> {
         let folder = match tempfile::tempdir() {
             Ok(folder) => folder,
-            Err(e) => return vec![Verdict::Unjudged(e.to_string()); self.places.len()],
+            Err(e) => return vec![Verdict::Unjudged(e.to_string()); places.len()],
         };
         let at = (folder.path(), self.longest);
         let reference = Reference::of(extreme, specimen, subject, at);
         let rest = match rest(specimen, folder.path()) {
             Ok(rest) => rest,
-            Err(why) => return vec![Verdict::Refused(first_line(&why)); self.places.len()],
+            Err(why) => return vec![Verdict::Refused(first_line(&why)); places.len()],
         };
-        let verdict = |place: &Place| {
+        let verdict = |place: &&Place| {
             let tolerances = Tolerances::usual(place.precision);
             let ran = run(specimen, specimen.units, &place.target, place.precision, tolerances, at);
             let unsolved = || unsolved(specimen, subject, specimen.units, &ran.looks, folder.path());
             let keeps_energy = specimen.integrator.is_explicit() && specimen.law.damping.is_none();
             judge(&ran, &reference, &rest, (place.precision, keeps_energy), unsolved)
         };
-        self.places.iter().map(verdict).collect()
+        places.iter().map(verdict).collect()
     }
+}
+
+/// The first law of each kind: linear or not, with a domain or not, with a preferred direction or not, with damping or not.
+fn one_of_each_kind(laws: &[&'static LawEntry]) -> Vec<&'static LawEntry> {
+    let kind = |law: &LawEntry| {
+        let info = law.info;
+        (info.structure.linear, info.domain.is_some(), info.structure.isotropic, law.damping.is_some())
+    };
+    let mut found: Vec<&LawEntry> = vec![];
+    for law in laws {
+        if !found.iter().any(|other| kind(other) == kind(law)) {
+            found.push(law);
+        }
+    }
+    found
 }
 
 /// The body at rest, in units of length; a sliver's in m.

@@ -20,7 +20,9 @@ Tasks:
   reproduce tables-1-2 [--device cpu|cpu,gpu]
                      run the paper's traction test and its experiments, write docs/reproduction.md (some minutes)
   reproduce extremes measure the accuracy of every law, write docs/extremes.md
-  reproduce accuracy measure the accuracy of every element, write docs/accuracy.md
+  reproduce convergence
+                     measure the accuracy of every element, write docs/convergence.md
+  reproduce choices  measure what accuracy of four scenes costs, write docs/accuracy.md (12 minutes)
 
 Exit status: 0 done, 2 wrong arguments, 1 a step failed or is left to do (said on the error output).";
 
@@ -42,7 +44,8 @@ fn call(arguments: &[&str]) -> Result<(), Failure> {
         ["extremes", options @ ..] => extremes::call(options),
         ["reproduce", "tables-1-2", options @ ..] => reproduce::call(options),
         ["reproduce", "extremes"] => reproduce::extremes::call(),
-        ["reproduce", "accuracy"] => reproduce::accuracy::call(),
+        ["reproduce", "convergence"] => reproduce::convergence::call(),
+        ["reproduce", "choices"] => reproduce::choices::call(),
         ["help" | "-h" | "--help"] => {
             say(USAGE);
             Ok(())
@@ -51,7 +54,7 @@ fn call(arguments: &[&str]) -> Result<(), Failure> {
         ["law", "accept", ..] => Err(Failure::Usage("`law accept` takes the name of one law".to_string())),
         ["law", "unreviewed", ..] => Err(Failure::Usage("`law unreviewed` takes no arguments".to_string())),
         ["reproduce", ..] => Err(Failure::Usage(
-            "`reproduce` takes tables-1-2, and --device after it, extremes, or accuracy".to_string(),
+            "`reproduce` takes tables-1-2, and --device after it, extremes, convergence, or choices".to_string(),
         )),
         other => Err(Failure::Usage(format!("there is no task `{}`", other.join(" ")))),
     }

@@ -32,7 +32,12 @@ use residual::Residual;
 use strain::Strains;
 
 /// How often recorded states of a run are looked at, at most.
-const LOOKS: u64 = 64;
+const LOOKS: u64 = 16;
+
+/// Whether the guards of a body ask a device for its state; those of implicit steps ask at the end.
+pub fn reads(body: &Body, implicit: bool) -> bool {
+    implicit || Strains::of(body).is_needed() || Inverted::of(body).is_needed()
+}
 
 /// The guards of a run.
 #[derive(Debug, Clone, Default)]

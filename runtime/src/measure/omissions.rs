@@ -37,7 +37,7 @@ pub struct Side {
     pub seconds: Vec<f64>,
     /// Bytes that were held at once.
     pub bytes: usize,
-    /// Kernels that ran in it and not in the other.
+    /// Kernels that ran in it, and less often or not at all in the other.
     pub kernels: Vec<String>,
 }
 
@@ -111,7 +111,7 @@ pub(super) fn omissions(target: &Target, setting: &Setting) -> Result<Vec<Omissi
         let [with, without] = [with, without].map(|text| scene::parse(&text, "bench.toml", &[]));
         let scenes = [with?, without?];
         let mut sides = [Side::default(), Side::default()];
-        let mut kernels = [vec![], vec![]];
+        let mut kernels: [Vec<(String, u64)>; 2] = [vec![], vec![]];
         for repeat in 0..setting.repeats.max(1) {
             // In turn, and each first as often: a drift of the machine does not become a result.
             for k in if repeat % 2 == 0 { [0, 1] } else { [1, 0] } {
@@ -124,11 +124,13 @@ pub(super) fn omissions(target: &Target, setting: &Setting) -> Result<Vec<Omissi
                 sides[k].seconds.push(clock.seconds());
                 sides[k].bytes = inventory["allocated_bytes"].as_u64().unwrap_or(0) as usize;
                 let names = inventory["kernel_runs"].as_object().into_iter().flatten();
-                kernels[k] = names.map(|(name, _)| name.clone()).collect();
+                kernels[k] = names.map(|(name, runs)| (name.clone(), runs.as_u64().unwrap_or(0))).collect();
             }
         }
         for k in 0..2 {
-            sides[k].kernels = kernels[k].iter().filter(|name| !kernels[1 - k].contains(name)).cloned().collect();
+            let others = |name: &str| kernels[1 - k].iter().find(|(n, _)| n == name).map_or(0, |(_, runs)| *runs);
+            let more = kernels[k].iter().filter(|(name, runs)| *runs > others(name));
+            sides[k].kernels = more.map(|(name, _)| name.clone()).collect();
         }
         let [with, without] = sides;
         Ok(Omission { name, law, with, without })

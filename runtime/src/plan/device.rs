@@ -5,6 +5,7 @@ use super::buffers::{Buffer, grids};
 use crate::backend::REGISTERS;
 use crate::body::LawBatch;
 use crate::device_memory::{ALIGNMENT, GROUP, PASSES, WORK_GROUP, bytes, motions, partial_sums};
+use crate::guard;
 use crate::inventory::names;
 use crate::order::{DeviceOrder, Grouped};
 use crate::scene::Scene;
@@ -136,7 +137,7 @@ fn results(scene: &Scene, needed: &Needed, elements: &Sizes) -> usize {
         (true, 4 * elements.largest),
         (records.stresses, 36 * elements.largest),
         (needed.implicit, 4 * REGISTERS),
-        (vectors || checkpoints || held, 16 * body.masses.len()),
+        (vectors || checkpoints || held || guard::reads(body, needed.implicit), 16 * body.masses.len()),
     ];
     parts.iter().filter(|(reads, _)| *reads).map(|(_, bytes)| bytes.next_power_of_two()).max().unwrap_or(0)
 }

@@ -433,7 +433,7 @@ pub struct Initial {
     pub gradient: [[f64; 3]; 3],
     /// The point in m that this gradient does not move, each coordinate within +-1e6; without it the centre of mass.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(inner(inner(range(min = -1e6, max = 1e6))))]
+    #[schemars(inner(range(min = -1e6, max = 1e6)))]
     pub about: Option<[f64; 3]>,
 }
 

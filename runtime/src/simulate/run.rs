@@ -151,8 +151,9 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
                 frames.write(&self.model.mesh, time, &data)?;
             }
         }
-        self.look_back(&ending, observer);
-        let summary = self.summary(&ending, &results, self.started.elapsed().as_secs_f64());
+        let energies = self.energies().ok().filter(|_| self.system.backend.check().is_ok());
+        self.look_back(&ending, energies, observer);
+        let summary = self.summary(&ending, energies, &results, self.started.elapsed().as_secs_f64());
         if let Some(out) = out {
             write_json_atomic(&out.join("summary.json"), &summary)?;
             if let Ending::Failed(SolveError::LeftDomain(e)) = &ending {
@@ -421,14 +422,13 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
     }
 
     /// Warns of what the guards saw, the last state included.
-    fn look_back(&mut self, ending: &Ending, observer: &mut (dyn Observer + Send)) {
+    fn look_back(&mut self, ending: &Ending, energies: Option<Energies>, observer: &mut (dyn Observer + Send)) {
         if self.guards.is_due_at_end(self.state.step) {
             self.look();
         }
         if *ending == Ending::Done {
             self.judge_residual();
-            let energies = self.energies();
-            if energies.is_ok_and(|e| !e.total().is_finite()) {
+            if energies.is_some_and(|e| !e.total().is_finite()) {
                 self.warnings.push(format!(
                     "the energy is beyond what {} holds; displacements are right all the same",
                     precision_name(self.scene.solver.precision)
@@ -540,8 +540,7 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         self.system.backend.download(x).into_iter().map(|v| v.map(|c| c * unit)).collect()
     }
 
-    fn summary(&mut self, ending: &Ending, results: &Results, wall: f64) -> Value {
-        let energies = self.energies().ok().filter(|_| self.system.backend.check().is_ok());
+    fn summary(&mut self, ending: &Ending, energies: Option<Energies>, results: &Results, wall: f64) -> Value {
         let scale = self.model.scale;
         let probes: serde_json::Map<String, Value> =
             self.model.recorder.names().iter().zip(&results.last).map(|((n, _), v)| (n.clone(), json!(v))).collect();

@@ -1,9 +1,10 @@
 //! `cargo xtask reproduce tables-1-2`: makes docs/reproduction.md from runs of the traction test; `extremes`: the accuracy
 //! of laws; `accuracy`: that of elements.
 
-pub mod accuracy;
 mod chain;
+pub mod choices;
 mod conclusions;
+pub mod convergence;
 mod document;
 mod experiments;
 pub mod extremes;

@@ -1,4 +1,4 @@
-//! `cargo xtask reproduce accuracy`: makes docs/accuracy.md and its pictures from the example `convergence`.
+//! `cargo xtask reproduce convergence`: makes docs/convergence.md and its pictures from the example `convergence`.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -7,10 +7,10 @@ use std::process::Stdio;
 use crate::process::{Failure, cargo, root, say};
 
 const INTRODUCTION: &str = "\
-<!-- Made by `cargo xtask reproduce accuracy`. Do not edit: change xtask/src/reproduce/accuracy.rs and make it again. -->
+<!-- Made by `cargo xtask reproduce convergence`. Do not edit: change xtask/src/reproduce/convergence.rs and make it again. -->
 # Accuracy of every element
 
-`cargo xtask reproduce accuracy` writes this page and its pictures from `runtime/examples/convergence.rs`.
+`cargo xtask reproduce convergence` writes this page and its pictures from `runtime/examples/convergence.rs`.
 
 ## Orders of convergence
 
@@ -56,8 +56,8 @@ pub fn call() -> Result<(), Failure> {
     };
     write("docs/images/convergence_displacement.svg", plot(&lines, "error of the displacement", |l| l.displacement))?;
     write("docs/images/convergence_energy.svg", plot(&lines, "error of the energy", |l| l.energy))?;
-    write("docs/accuracy.md", page(&lines))?;
-    say("wrote docs/accuracy.md and docs/images/convergence_*.svg: review and commit them");
+    write("docs/convergence.md", page(&lines))?;
+    say("wrote docs/convergence.md and docs/images/convergence_*.svg: review and commit them");
     Ok(())
 }
 
