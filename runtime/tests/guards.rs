@@ -139,6 +139,20 @@ const CASES: &[Case] = &[
         below: &["material.0.parameters.poisson=0.46", "mesh.beam.element=triangle_p2", "mesh.beam.cells=[2, 2, 1]"],
     },
     Case {
+        guard: "inverted",
+        words: "elements are inside out",
+        text: BLOCK,
+        beyond: &["material.0.law=hooke", "boundary.3.move.x.ramp=[[0.0, 0.0], [1.0, -1.001]]"],
+        below: &["material.0.law=hooke", "boundary.3.move.x.ramp=[[0.0, 0.0], [1.0, -0.999]]"],
+    },
+    Case {
+        guard: "residual",
+        words: "displacements of the equilibrium are off by about",
+        text: BLOCK,
+        beyond: &["solver.precision=f32", "material.0.parameters.poisson=0.4999", "solver.newton.tolerance=1e-4"],
+        below: &["solver.precision=f32", "material.0.parameters.poisson=0.3", "solver.newton.tolerance=1e-4"],
+    },
+    Case {
         guard: "linear",
         words: "is linear and holds for small rotations and strains only",
         text: SAGGING,

@@ -66,6 +66,7 @@ impl Ran {
         bytes / each
     }
 
+    #[cfg(feature = "gpu")]
     fn count(&self, what: &str) -> u64 {
         self.summary["device_counts"][what].as_u64().expect("a device counts")
     }
