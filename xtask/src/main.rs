@@ -15,8 +15,9 @@ Usage: cargo xtask TASK
 Tasks:
   law accept NAME    write the derivation, snapshots and SymPy values of laws/NAME.rs, for review and commit
   law unreviewed     fail if a committed law has no committed derivation that fits its text
-  extremes [--planted]
-                     drive whole scenes to extremes, write docs/stability.md; with planted faults, which the suite has to find
+  extremes [--planted] [--gpu]
+                     drive whole scenes to extremes, write docs/stability.md; with planted faults, which the suite has to find;
+                     on a GPU besides
   reproduce tables-1-2 [--device cpu|cpu,gpu]
                      run the paper's traction test and its experiments, write docs/reproduction.md (some minutes)
   reproduce extremes measure the accuracy of every law, write docs/extremes.md

@@ -10,7 +10,7 @@
 //! | `residual` | what solvers report against what is true | the last step |
 //! | `step` | the step of explicit integrators against the critical one | once |
 //!
-//! States are looked at on the CPU in f64, at most [`LOOKS`] times a run and at its end: a look costs about as much as the
+//! States are looked at on the CPU in f64, at most 16 times a run and at its end: a look costs about as much as the
 //! forces do. docs/scenes.md says where thresholds come from.
 
 mod at_rest;
@@ -31,7 +31,7 @@ pub use residual::LastStep;
 use residual::Residual;
 use strain::Strains;
 
-/// How often recorded states of a run are looked at, at most.
+/// How often recorded states of a run are looked at, at most, as said above.
 const LOOKS: u64 = 16;
 
 /// Whether the guards of a body ask a device for its state; those of implicit steps ask at the end.
