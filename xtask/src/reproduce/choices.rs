@@ -20,13 +20,13 @@ const STUDIES: [Study; 4] = [
 ];
 
 /// Seconds for each scene.
-const BUDGET: &str = "180";
+const BUDGET: &str = "100";
 
 const INTRODUCTION: &str = "\
 <!-- Made by `cargo xtask reproduce choices`. Do not edit: change xtask/src/reproduce/choices.rs and make it again. -->
 # How to choose
 
-`cargo xtask reproduce choices` writes this page and its pictures from `tensormass tradeoff` of four scenes, 180 s each, on the machine
+`cargo xtask reproduce choices` writes this page and its pictures from `tensormass tradeoff` of four scenes, 100 s each, on the machine
 where it runs; [tradeoff.md](tradeoff.md) says how errors are measured. For a scene of your own run `tensormass tradeoff SCENE --out DIR
 --target-error 0.05`: it prints the cheapest setting measured that is as accurate, as arguments of `run`.
 
