@@ -43,8 +43,6 @@ pub enum Drive {
     Weight(f64),
     /// A block between planes is stretched along x, its sides free: the same everywhere.
     Stretch(f64),
-    /// As [`Drive::Stretch`], with the sides held too.
-    Held(f64),
     /// A free block that begins with a gradient of displacement, row by row.
     Start([[f64; 3]; 3]),
     /// A free block that spins, rad for each unit of time.
@@ -117,7 +115,7 @@ impl Specimen<'_> {
     pub fn beam(&self) -> ([f64; 3], [u32; 3]) {
         match self.drive {
             Drive::Weight(_) => ([4.0, 1.0, 1.0], [4, 2, 2]),
-            Drive::Stretch(_) | Drive::Held(_) => ([1.0; 3], [2; 3]),
+            Drive::Stretch(_) => ([1.0; 3], [2; 3]),
             Drive::Start(_) | Drive::Spin(_) => ([2.0, 1.0, 1.0], [4, 2, 2]),
             Drive::Begun(..) => ([2.0, 1.0, 1.0], [2, 1, 1]),
         }
@@ -194,7 +192,7 @@ impl Specimen<'_> {
             Drive::Start(gradient) => (Some(gradient), None),
             Drive::Spin(speed) => (None, Some(speed)),
             Drive::Begun(gradient, speed) => (Some(gradient), Some(speed)),
-            Drive::Weight(_) | Drive::Stretch(_) | Drive::Held(_) => (None, None),
+            Drive::Weight(_) | Drive::Stretch(_) => (None, None),
         };
         if gradient.is_some() || speed.is_some() {
             text += "[initial]\n";
@@ -227,7 +225,7 @@ impl Specimen<'_> {
                  max_iterations = {iterations} }}\n"
             );
         }
-        if matches!(self.drive, Drive::Stretch(_) | Drive::Held(_)) {
+        if matches!(self.drive, Drive::Stretch(_)) {
             text +=
                 "[[probe]]\nname = \"reaction\"\nkind = \"reaction\"\nnodes = \"near(x, xmax)\"\ncomponent = \"x\"\n";
         }
@@ -245,9 +243,6 @@ impl Specimen<'_> {
             Drive::Stretch(stretch) => {
                 let planes = ["x", "y", "z"].map(|c| fix(&format!("near({c}, {c}min)"), &format!("[{c:?}]")));
                 format!("{}{}", planes.concat(), pulled(stretch))
-            }
-            Drive::Held(stretch) => {
-                format!("{}{}{}", fix("near(x, xmin)", "[\"x\"]"), fix("all", "[\"y\", \"z\"]"), pulled(stretch))
             }
             Drive::Start(_) | Drive::Spin(_) | Drive::Begun(..) => String::new(),
         }

@@ -1,28 +1,30 @@
 //! One run on one backend: steps, records, and what is written of them.
 
-use std::path::{Path, PathBuf};
+mod judge;
+mod record;
+mod summary;
+
+use std::path::Path;
 use std::time::Instant;
 
-use serde_json::{Value, json};
-
-use crate::backend::{Backend, ForceField, LeftDomain};
-use crate::frames::{FrameData, Frames};
-use crate::guard::{Guards, LastStep};
-use crate::inventory::{Held, Inventory};
+use crate::backend::{Backend, ForceField};
+use crate::guard::Guards;
 use crate::model::Model;
-use crate::output::{OutputError, ProbeTable, create_folder, remove_file, write_json_atomic};
-use crate::plan::{Layout, Plan, integrator_name, precision_name};
-use crate::probe::{Energies, Needs, Snapshot};
+use crate::output::write_json_atomic;
+use crate::plan::Layout;
+use crate::probe::Needs;
 use crate::scene::{self, Scene};
 use crate::step_limit::StepLimits;
 use crate::system::{SolveError, State, StepReport, System};
 use crate::tangent::{ChosenBy, Tangent};
 
 use super::checkpoint::{Checkpoint, header};
-use super::impulses::{Impulses, Record};
+use super::impulses::Impulses;
+use record::Results;
+
 use super::setup::{Stepper, integrator, limits, stepping};
 use super::watch::Watch;
-use super::{Ending, Observer, Outcome, RunError, Sample};
+use super::{Ending, Observer, Outcome, RunError};
 
 /// The name of the file of the newest checkpoint.
 const CHECKPOINT: &str = "checkpoint.tmc";
@@ -360,316 +362,5 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
                 limits.power, limits.element
             ));
         }
-    }
-
-    /// Records probes and a frame, where the scene wants them now.
-    fn record(
-        &mut self,
-        results: &mut Results,
-        observer: &mut (dyn Observer + Send),
-    ) -> Result<Result<(), SolveError>, OutputError> {
-        let time = self.state.time * self.model.scale.time;
-        if self.scene.output.wants_probes(self.state.step, self.steps) {
-            let snapshot = match self.snapshot(self.model.recorder.needs()) {
-                Ok(snapshot) => snapshot,
-                Err(e) => return Ok(Err(e)),
-            };
-            results.last = self.model.recorder.read(&self.model.mesh, &snapshot);
-            if let Some(table) = &mut results.probes {
-                let mut row = vec![time];
-                row.extend(&results.last);
-                table.append(&row)?;
-            }
-        }
-        if self.samples.binary_search(&self.state.step).is_ok() {
-            match self.sample(results) {
-                Ok(sample) => observer.sample(sample),
-                Err(e) => return Ok(Err(e)),
-            }
-        }
-        if let Some(frames) = &mut results.frames
-            && self.scene.output.wants_frame(self.state.step, self.steps)
-        {
-            let needs = frames.needs();
-            match self.frame(needs) {
-                Ok(data) => frames.write(&self.model.mesh, time, &data)?,
-                Err(e) => return Ok(Err(e)),
-            }
-        }
-        if self.guards.is_due(self.state.step) {
-            self.look();
-        }
-        Ok(Ok(()))
-    }
-
-    /// Lets the guards look at the state.
-    fn look(&mut self) {
-        let u = self.system.backend.download(&self.state.u);
-        let time = self.state.time * self.model.scale.time;
-        self.guards.look(&self.system.body, &u, self.state.step, time);
-    }
-
-    /// Lets the guards judge the last step's residual; contact would hold what they take for out of balance.
-    fn judge_residual(&mut self) {
-        let backend = &self.system.backend;
-        let met = self.system.touch.as_ref().is_some_and(|touch| touch.is_looked_for);
-        let solved = self.integrator.solved(backend);
-        if let (Some(before), Some(solved), false) = (self.before_last.take(), solved, met) {
-            let after = backend.download(&self.state.u);
-            let (body, solver, clock) = (&self.system.body, &self.scene.solver, [self.step, self.state.time]);
-            self.guards.judge(&LastStep { body, solver, clock, before: &before, after: &after, solved });
-        }
-    }
-
-    /// Warns of what the guards saw, the last state included.
-    fn look_back(&mut self, ending: &Ending, energies: Option<Energies>, observer: &mut (dyn Observer + Send)) {
-        if self.guards.is_due_at_end(self.state.step) {
-            self.look();
-        }
-        if *ending == Ending::Done {
-            self.judge_residual();
-            if energies.is_some_and(|e| !e.total().is_finite()) {
-                self.warnings.push(format!(
-                    "the energy is beyond what {} holds; displacements are right all the same",
-                    precision_name(self.scene.solver.precision)
-                ));
-            }
-        }
-        // States of a simulation that blew up say nothing of its laws.
-        if !matches!(ending, Ending::Failed(SolveError::Diverged { .. })) {
-            let found = self.guards.after();
-            found.iter().for_each(|warning| observer.warning(warning));
-            self.warnings.extend(found);
-        }
-    }
-
-    /// The state for an observer.
-    fn sample(&mut self, results: &Results) -> Result<Sample, SolveError> {
-        let has_probes = self.scene.output.wants_probes(self.state.step, self.steps);
-        let sample = Sample {
-            step: self.state.step,
-            time: self.state.time * self.model.scale.time,
-            displacement: self.in_si(&self.state.u, self.model.scale.length),
-            energies: self.energies()?,
-            probes: if has_probes { results.last.clone() } else { vec![] },
-        };
-        self.system.backend.check()?;
-        Ok(sample)
-    }
-
-    fn snapshot(&mut self, needs: Needs) -> Result<Snapshot, SolveError> {
-        let scale = self.model.scale;
-        let mut snapshot = Snapshot::default();
-        if needs.displacement {
-            snapshot.displacement = self.in_si(&self.state.u, scale.length);
-        }
-        if needs.reactions {
-            let mut f = self.system.backend.zeros();
-            self.system.force(&self.state.u, self.state.time, &mut f)?;
-            if let Some(v) = &self.state.v {
-                self.system.add_damping(&self.state.u, v, &mut f);
-            }
-            snapshot.reactions = self.in_si(&f, -scale.force());
-        }
-        if needs.energies {
-            snapshot.energies = self.energies()?;
-        }
-        if needs.stresses {
-            snapshot.stresses = self.stresses();
-        }
-        if needs.contact {
-            snapshot.contact = self.contact(Record::Probes);
-        }
-        self.system.backend.check()?;
-        Ok(snapshot)
-    }
-
-    fn frame(&mut self, needs: Needs) -> Result<FrameData, SolveError> {
-        let scale = self.model.scale;
-        let mut data = FrameData { displacement: self.in_si(&self.state.u, scale.length), ..FrameData::default() };
-        if needs.velocity {
-            let still = || vec![[0.0; 3]; self.model.mesh.nodes().len()];
-            let v = self.state.v.as_ref();
-            data.velocity = v.map_or_else(still, |v| self.in_si(v, scale.velocity()));
-        }
-        if needs.stresses {
-            data.stresses = self.stresses();
-        }
-        if needs.contact {
-            data.contact = self.contact(Record::Frames);
-        }
-        if needs.energies {
-            let energies = self.system.field.element_energies(&self.system.backend, &self.state.u)?;
-            data.energies = energies.into_iter().map(|w| w * scale.energy()).collect();
-        } else {
-            data.energies = vec![f64::NAN; self.system.body.elements.len()];
-        }
-        self.system.backend.check()?;
-        Ok(data)
-    }
-
-    fn stresses(&mut self) -> Vec<[f64; 9]> {
-        let stress = self.model.scale.stress;
-        self.system
-            .field
-            .cauchy(&self.system.backend, &self.state.u)
-            .into_iter()
-            .map(|s| s.map(|x| x * stress))
-            .collect()
-    }
-
-    /// The mean force of contact on each node since the last record of a kind, in N.
-    fn contact(&mut self, of: Record) -> Vec<[f64; 3]> {
-        let unit = self.model.scale.force();
-        let forces = self.impulses.forces(&mut self.system, of, self.state.time);
-        forces.into_iter().map(|f| f.map(|x| x * unit)).collect()
-    }
-
-    fn energies(&mut self) -> Result<Energies, LeftDomain> {
-        let System { backend, field, .. } = &mut self.system;
-        let elastic = field.potential_energy(backend, &self.state.u)?;
-        let unit = self.model.scale.energy();
-        Ok(Energies {
-            kinetic: self.state.v.as_ref().map_or(0.0, |v| self.system.kinetic_energy(v) * unit),
-            elastic: elastic * unit,
-            external: -self.system.load_work(&self.state.u, self.state.time) * unit,
-        })
-    }
-
-    fn in_si(&self, x: &B::Vector, unit: f64) -> Vec<[f64; 3]> {
-        self.system.backend.download(x).into_iter().map(|v| v.map(|c| c * unit)).collect()
-    }
-
-    fn summary(&mut self, ending: &Ending, energies: Option<Energies>, results: &Results, wall: f64) -> Value {
-        let scale = self.model.scale;
-        let probes: serde_json::Map<String, Value> =
-            self.model.recorder.names().iter().zip(&results.last).map(|((n, _), v)| (n.clone(), json!(v))).collect();
-        let plan = match &self.tangents {
-            Some((tangents, _)) => Plan::with_tangents(self.scene, &self.model, self.layout, tangents),
-            None => Plan::new(self.scene, &self.model, self.layout),
-        };
-        let implicit = !self.scene.solver.integrator.is_explicit();
-        let tangents_by = self.tangents.as_ref().filter(|_| implicit).map(|(_, by)| *by);
-        let status = match ending {
-            Ending::Done => "done",
-            Ending::Failed(_) => "failed",
-            Ending::Interrupted => "interrupted",
-        };
-        let error = match ending {
-            Ending::Failed(e) => Some(e.to_string()),
-            Ending::Done | Ending::Interrupted => None,
-        };
-        json!({
-            "scene": self.scene.path().display().to_string(),
-            "title": self.scene.scene.title,
-            "status": status,
-            "error": error,
-            "device": self.system.backend.name(),
-            "precision": precision_name(self.scene.solver.precision),
-            "integrator": integrator_name(self.scene.solver.integrator),
-            "nodes": self.model.mesh.nodes().len(),
-            "elements": self.model.mesh.len(),
-            "steps": self.state.step,
-            "step_s": self.step * scale.time,
-            "simulated_time_s": self.state.time * scale.time,
-            "wall_time_s": wall,
-            "energies": energies.map(|e| json!({
-                "kinetic_J": e.kinetic, "elastic_J": e.elastic, "external_J": e.external, "total_J": e.total(),
-            })),
-            "probes": probes,
-            "step_limits": self.limits.map(|l| json!({ "element_s": l.element, "power_s": l.power })),
-            "solver": {
-                "force_evaluations": self.cost.forces,
-                "tangent_products": self.cost.products,
-                "newton_iterations": self.cost.newton,
-                "stagnated_solutions": self.cost.stagnated,
-                "negative_curvatures": self.cost.negative_curvature,
-                "unsettled_contacts": self.cost.unsettled,
-                "residual_left_by_rounding": self.cost.left,
-                "tangents_chosen_by": tangents_by,
-            },
-            "guards": self.guards.to_json(),
-            "contact": self.system.touch.as_ref().map(|touch| json!({ "steps_that_looked": touch.steps })),
-            "device_counts": self.device_counts(),
-            "inventory": self.inventory(),
-            "units": { "length_m": scale.length, "stress_Pa": scale.stress, "time_s": scale.time },
-            "model": plan.to_json(),
-            "warnings": self.warnings,
-        })
-    }
-
-    /// What the device was asked to do; nothing where there is none to be waited for.
-    fn device_counts(&self) -> Option<Value> {
-        let counts = self.system.backend.counts();
-        (counts.dispatches > 0).then(|| {
-            json!({
-                "dispatches": counts.dispatches, "submissions": counts.submissions,
-                "readbacks": counts.readbacks, "bytes_read": counts.bytes_read,
-            })
-        })
-    }
-
-    /// What was held at most and is at the end, and what ran how often.
-    fn inventory(&self) -> Value {
-        let Inventory { buffers, all, kernels } = self.system.backend.ledger().inventory();
-        let of = |bytes: fn(&Held) -> usize| -> serde_json::Map<String, Value> {
-            let some = buffers.iter().filter(|(_, held)| bytes(held) > 0);
-            some.map(|(name, held)| (name.clone(), json!(bytes(held)))).collect()
-        };
-        let runs: serde_json::Map<String, Value> =
-            kernels.into_iter().map(|(name, used)| (name, json!(used.runs))).collect();
-        json!({
-            "allocated_bytes": all.peak, "buffers_bytes": of(|held| held.peak), "held_bytes": of(|held| held.bytes),
-            "kernel_runs": runs,
-        })
-    }
-
-    /// The element that left its law's domain, by itself: enough to evaluate it again.
-    fn failure(&self, e: &LeftDomain) -> Value {
-        let nodes = &self.system.body.elements[e.element as usize];
-        let u = self.in_si(&self.state.u, self.model.scale.length);
-        json!({
-            "error": e.to_string(),
-            "law": e.law,
-            "parameters": self.model.assignment.parameters(e.element),
-            "element": e.element,
-            "time_s": self.state.time * self.model.scale.time,
-            "kind": self.model.mesh.kind(crate::mesh::ElementId(e.element)).info.name,
-            "rest_positions_m": nodes.iter().map(|n| self.model.mesh.nodes()[*n as usize]).collect::<Vec<_>>(),
-            "last_displacements_m": nodes.iter().map(|n| u[*n as usize]).collect::<Vec<_>>(),
-        })
-    }
-}
-
-/// The files of a run.
-struct Results {
-    folder: Option<PathBuf>,
-    probes: Option<ProbeTable>,
-    frames: Option<Frames>,
-    last: Vec<f64>,
-}
-
-impl Results {
-    /// Files in a folder; those of a run until a time are kept, if it goes on from there.
-    fn create(scene: &Scene, model: &Model, out: Option<&Path>, until: Option<f64>) -> Result<Self, OutputError> {
-        let Some(out) = out else { return Ok(Self { folder: None, probes: None, frames: None, last: vec![] }) };
-        create_folder(out)?;
-        // What an earlier run left under the names that this one may not write.
-        for stale in ["summary.json", "failure.json"] {
-            remove_file(&out.join(stale))?;
-        }
-        let mut columns = vec!["time_s".to_string()];
-        columns.extend(model.recorder.names().iter().map(|(name, unit)| format!("{name} [{unit}]")));
-        let (table, fields) = (out.join("probes.csv"), &scene.output.fields);
-        let probes = match until {
-            Some(until) => ProbeTable::resume(&table, &columns, until)?,
-            None => ProbeTable::create(&table, &columns)?,
-        };
-        let frames = match (scene.output.frames, until) {
-            (Some(0), _) => None,
-            (_, Some(until)) => Some(Frames::resume(out, &model.mesh, fields, until)?),
-            (_, None) => Some(Frames::create(out, &model.mesh, fields)?),
-        };
-        Ok(Self { folder: Some(out.to_owned()), probes: Some(probes), frames, last: vec![] })
     }
 }
