@@ -376,3 +376,21 @@ fn a_body_beyond_the_limits_is_refused() {
     let refused = GpuBackend::new(gpu, &body, GpuOptions::default()).map(|_| ());
     assert_eq!(refused, Err(DeviceError::TooLarge { what: "a vector over the nodes".to_string(), bytes, limit }));
 }
+
+/// A kernel's text is compiled once for a device: another run of the same laws adds none, whatever its material, mesh and step; another
+/// law does.
+#[test]
+fn kernels_are_compiled_once_for_a_device() {
+    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let compiled = |name: &str, set: &[&str]| {
+        let law = laws().iter().find(|law| law.info.name == name).expect("a law of the build");
+        let shorter = ["solver.step=0.01", "solver.duration=0.02"];
+        on_gpu(&gpu, &scene(&bent(law, "integrator = \"implicit-euler\""), &[&shorter[..], set].concat()));
+        gpu.kernels()
+    };
+    let first = compiled("neo_hookean", &[]);
+    assert!(first > 0);
+    let others = ["material.0.parameters.young=2e6", "mesh.beam.cells=[6, 3, 2]", "solver.step=0.005"];
+    assert_eq!(compiled("neo_hookean", &others), first);
+    assert!(compiled("st_venant_kirchhoff", &[]) > first);
+}

@@ -158,3 +158,26 @@ fn one_increment_reaches_what_twenty_do() {
         }
     }
 }
+
+/// A motion imposed on a nearly incompressible block throws it out of balance by forces of its bulk modulus, far larger than those that
+/// hold it in the end: the tolerance is a part of the lesser ones. What Newton's tolerance of 1e-6 leaves of displacements is
+/// 1e-6 times the condition number (1e2) of what shears.
+#[test]
+fn a_tolerance_is_a_part_of_what_holds_the_body() {
+    let is_of_two = |l: &&LawEntry| l.info.parameters.iter().map(|p| p.name).eq(["young", "poisson"]);
+    for law in tensormass_runtime::laws().iter().filter(is_of_two).filter(|l| !l.info.structure.linear) {
+        let at = |tolerance: f64| {
+            let set = [
+                format!("material.0.law={:?}", law.info.name),
+                "material.0.parameters={ young = 1e6, poisson = 0.4999 }".to_owned(),
+                "boundary.3.move.x.ramp=[[0.0, 0.0], [1.0, 0.2]]".to_owned(),
+                format!("solver.newton.tolerance={tolerance:?}"),
+                "solver.cg={ tolerance = 1e-6, max_iterations = 5000 }".to_owned(),
+            ];
+            probe(&done(&scene(STRETCH, &set)), "greatest")
+        };
+        let error = support::relative(at(1e-6), at(1e-13));
+        println!("{}: {error:.1e}", law.info.name);
+        assert!(error <= 1e-4, "{}: displacements are off by {error:.1e}", law.info.name);
+    }
+}

@@ -5,6 +5,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::device::{DeviceChoice, DeviceError, DeviceFeatures, DeviceInfo, DeviceKind, DeviceLimits, select};
 
+use super::pipelines::{Pipeline, Pipelines};
+use super::shaders::Access;
+
 /// Sizes that we ask for beyond WebGPU's are multiples of this: wherever a buffer is split, its parts can be bound.
 const ALIGNMENT: u64 = 256;
 
@@ -43,6 +46,7 @@ pub struct Gpu {
     pub queue: wgpu::Queue,
     info: DeviceInfo,
     limits: DeviceLimits,
+    pipelines: Pipelines,
     faults: Faults,
 }
 
@@ -72,7 +76,7 @@ impl Gpu {
             lost.record(DeviceError::Lost { reason });
         });
         let limits = limits(&device.limits());
-        Ok(Self { device, queue, info, limits, faults })
+        Ok(Self { device, queue, info, limits, pipelines: Pipelines::default(), faults })
     }
 
     /// What it is.
@@ -89,6 +93,16 @@ impl Gpu {
     /// Whether it is a driver that computes on the CPU.
     pub fn is_software(&self) -> bool {
         !self.info.kind.is_hardware()
+    }
+
+    /// A shader's text compiled for the device, with how it binds buffers and its parameters: once.
+    pub(super) fn pipeline(&self, label: &str, shader: (&str, &[Access], &[(&str, f64)])) -> Pipeline {
+        self.pipelines.get(&self.device, label, shader)
+    }
+
+    /// How many different kernels it has compiled.
+    pub fn kernels(&self) -> usize {
+        self.pipelines.count()
     }
 
     /// The first thing that went wrong, as far as it is known by now.

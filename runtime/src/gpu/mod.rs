@@ -9,6 +9,7 @@ mod device;
 mod field;
 mod page;
 mod passes;
+mod pipelines;
 mod pressure;
 mod recorder;
 mod shaders;

@@ -15,6 +15,7 @@ use crate::inventory::names::{MOTIONS, NUMBERS, RESULTS};
 use crate::inventory::{Lease, Ledger, Tally};
 
 use super::device::Gpu;
+use super::pipelines::Pipeline;
 use super::shaders::Access;
 
 /// Bytes of the numbers of all passes of a submission.
@@ -36,8 +37,7 @@ pub(super) struct Memory {
 pub(super) struct Kernel {
     id: u64,
     tally: Tally,
-    pipeline: wgpu::ComputePipeline,
-    layout: wgpu::BindGroupLayout,
+    compiled: Pipeline,
 }
 
 /// Records dispatches and hands them over; counts both.
@@ -170,44 +170,10 @@ impl Recorder {
         self.gpu.queue.write_buffer(&memory.buffer, 0, bytemuck::cast_slice(content));
     }
 
-    /// Compiles a shader that binds these in order; constants are the pipeline's parameters.
+    /// A compiled shader that binds these in order; constants are the pipeline's parameters.
     pub(super) fn kernel(&self, label: &str, text: &str, bindings: &[Access], constants: &[(&str, f64)]) -> Rc<Kernel> {
-        let device = &self.gpu.device;
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(label),
-            source: wgpu::ShaderSource::Wgsl(text.into()),
-        });
-        let entry = |(binding, access): (usize, &Access)| wgpu::BindGroupLayoutEntry {
-            binding: binding as u32,
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer {
-                ty: match access {
-                    Access::Uniform => wgpu::BufferBindingType::Uniform,
-                    Access::Read => wgpu::BufferBindingType::Storage { read_only: true },
-                    Access::Write => wgpu::BufferBindingType::Storage { read_only: false },
-                },
-                has_dynamic_offset: *access == Access::Uniform,
-                min_binding_size: None,
-            },
-            count: None,
-        };
-        let entries: Vec<_> = bindings.iter().enumerate().map(entry).collect();
-        let layout =
-            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries });
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some(label),
-            bind_group_layouts: &[Some(&layout)],
-            ..Default::default()
-        });
-        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(label),
-            layout: Some(&pipeline_layout),
-            module: &module,
-            entry_point: Some("main"),
-            compilation_options: wgpu::PipelineCompilationOptions { constants, ..Default::default() },
-            cache: None,
-        });
-        Rc::new(Kernel { id: self.id(), tally: self.ledger.kernel(label), pipeline, layout })
+        let compiled = self.gpu.pipeline(label, (text, bindings, constants));
+        Rc::new(Kernel { id: self.id(), tally: self.ledger.kernel(label), compiled })
     }
 
     /// Work groups in two dimensions for this many invocations; their product may be a little more than needed.
@@ -225,7 +191,7 @@ impl Recorder {
         let mut list = self.list.borrow_mut();
         let offset = list.offset(numbers);
         let pass = list.pass(&self.gpu.device);
-        pass.set_pipeline(&kernel.pipeline);
+        pass.set_pipeline(&kernel.compiled.pipeline);
         let key = (kernel.id, storage.iter().map(|m| m.id).collect());
         let mut bound = self.groups.borrow_mut();
         let group = bound.entry(key).or_insert_with(|| self.bind(kernel, storage));
@@ -252,7 +218,7 @@ impl Recorder {
         let entries: Vec<_> = std::iter::once(first).chain(others).collect();
         self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
-            layout: &kernel.layout,
+            layout: &kernel.compiled.layout,
             entries: &entries,
         })
     }

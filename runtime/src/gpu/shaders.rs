@@ -80,7 +80,7 @@ pub(super) const OPERATIONS: [Operation; 20] = [
 ];
 
 /// How a kernel binds a buffer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Access {
     /// A uniform with an offset given at each dispatch.
     Uniform,

@@ -11,8 +11,6 @@ use crate::scene::Precision;
 
 /// The relative error of stresses by rounding that is worth a warning: fewer than four digits are left.
 const ROUNDING: f64 = 1e-4;
-/// Tolerances times this ratio of stiffnesses are errors of displacements that are worth a look.
-const DOUBTFUL: f64 = 1e-4;
 /// Poisson's ratio from which on linear simplices are much too stiff.
 const LOCKING: f64 = 0.45;
 
@@ -74,9 +72,9 @@ impl AtRest {
         }
     }
 
-    /// Whether soft parts may be far from equilibrium where the residual, most of it of stiff parts, is within a tolerance.
-    pub(super) fn doubts(&self, tolerance: f64) -> bool {
-        self.stiffnesses.is_some_and(|[most, least]| tolerance.max(self.spacing) * most / least > DOUBTFUL)
+    /// The largest stiffness, lambda + 2 mu, over the least, mu.
+    pub(super) fn contrast(&self) -> f64 {
+        self.stiffnesses.map_or(1.0, |[most, least]| most / least)
     }
 
     /// The part of a stress that rounding takes: of a strain the relative rounding error is that of numbers, and lambda multiplies

@@ -8,6 +8,7 @@
 //! | `rounding` | lambda/mu at rest against the precision | once |
 //! | `locking` | Poisson's ratio at rest of linear simplices | once |
 //! | `residual` | what solvers report against what is true | the last step |
+//! | `curvature` | linear solutions of linearised steps that met a direction of negative curvature | all |
 //! | `step` | the step of explicit integrators against the critical one | once |
 //!
 //! States are looked at on the CPU in f64, at most 16 times a run and at its end: a look costs about as much as the
@@ -46,6 +47,8 @@ pub struct Guards {
     strains: Strains,
     inverted: Inverted,
     residual: Option<Residual>,
+    /// Of linearised steps: the solutions that met a direction of negative curvature.
+    curvature: Option<u64>,
     steps: u64,
     /// The step that was looked at last.
     seen: u64,
@@ -92,15 +95,14 @@ impl Guards {
         self.strains.is_needed() || self.inverted.is_needed()
     }
 
-    /// Whether an equilibrium found with this tolerance may be far from the true one, though the residual is small: stiff parts
-    /// make most of it.
-    pub fn doubts(&self, tolerance: f64) -> bool {
-        self.at_rest.doubts(tolerance)
-    }
-
     /// Computes the true residual of a step in f64, which costs about as much as a few steps.
     pub fn judge(&mut self, step: &LastStep) {
-        self.residual = Residual::of(step);
+        self.residual = Residual::of(step, self.at_rest.contrast());
+    }
+
+    /// Of linearised steps: how many of their linear solutions met a direction of negative curvature and ended there.
+    pub fn cut_short(&mut self, solutions: u64) {
+        self.curvature = Some(solutions);
     }
 
     /// Warnings of what was seen.
@@ -108,6 +110,12 @@ impl Guards {
         let mut warnings = self.strains.warnings();
         warnings.extend(self.inverted.warning());
         warnings.extend(self.residual.as_ref().and_then(Residual::warning));
+        if let Some(cut) = self.curvature.filter(|cut| *cut > 0) {
+            warnings.push(format!(
+                "{cut} linearised steps met a direction of negative curvature (the body buckles, or is compressed beyond what its law \
+                 resists) and were cut short there: no such step is a solution; take solver.newton.max_iterations above 1, or smaller steps"
+            ));
+        }
         warnings
     }
 
@@ -117,6 +125,7 @@ impl Guards {
         json!({
             "linear": linear, "stretches": stretches, "inverted": self.inverted.to_json(), "rounding": rounding, "locking": locking,
             "residual": self.residual.map(Residual::to_json),
+            "curvature": self.curvature.map(|cut| json!({ "cut_short": cut, "threshold": 0 })),
             "step": self.step.map(|ratio| json!({ "over_critical": ratio, "threshold": 1.0 })),
         })
     }

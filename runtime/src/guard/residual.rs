@@ -1,4 +1,5 @@
-//! The residual that an implicit step really left, in f64: a solver in f32 reports a recursive or a rounded one.
+//! The residual that an implicit step in f32 or an equilibrium really left, in f64: a solver in f32 reports a recursive or a rounded
+//! one, and one of statics what is left of an imposed motion's first imbalance.
 
 use serde_json::{Value, json};
 
@@ -6,19 +7,22 @@ use crate::backend::{Backend, ForceField, Operator};
 use crate::body::Body;
 use crate::cg::{CgLimits, ConjugateGradient};
 use crate::cpu::{CpuBackend, CpuField, CpuVector};
-use crate::scene::{Integrator, Newton, Solver};
+use crate::scene::{Integrator, Newton, Precision, Solver};
 use crate::system::{Solved, System};
 
 /// The true residual may be so many times what the solver should reach, or reports.
 const TIMES: f64 = 10.0;
 /// An error of displacements that is worth a warning.
 const ERROR: f64 = 1e-3;
+/// Tolerances times a ratio of stiffnesses are errors of displacements: from this on they are worth a look.
+const DOUBTFUL: f64 = 1e-4;
 /// How far the residual falls in the solution that estimates it, and its iterations.
 const ESTIMATE: CgLimits = CgLimits { tolerance: 1e-2, max_iterations: 1000 };
 /// A reported residual above this is no excuse for the true one.
 const EXCUSED: f64 = 1e-4;
-/// Newton's method evaluates its residuals, and stops where rounding leaves no less: 10 times this is not worth a warning.
-const ROUNDED: f64 = 1e-5;
+/// Newton's method evaluates its residuals, and stops where rounding leaves no less: 10 times this, in f32 and in f64, is not worth a
+/// warning.
+const ROUNDED: [f64; 2] = [1e-5, 1e-12];
 
 /// The last step of a run, in the body's units.
 pub struct LastStep<'a> {
@@ -43,22 +47,35 @@ pub(super) struct Residual {
     reported: f64,
     tolerance: f64,
     newton: bool,
+    precision: Precision,
     /// Of equilibrium: the greatest displacement that one more linear solution adds, as a part of the greatest.
     error: Option<f64>,
 }
 
 impl Residual {
-    /// Computes the true residual; none where it is not known: outside a law's domain, or without any force.
-    pub(super) fn of(step: &LastStep) -> Option<Self> {
+    /// Computes the true residual, of a body whose materials' stiffnesses differ so many times at rest; none where it is not known:
+    /// outside a law's domain, or without any force.
+    pub(super) fn of(step: &LastStep, contrast: f64) -> Option<Self> {
         let Newton { tolerance, max_iterations } = step.solver.newton;
         let newton = max_iterations > 1;
         let tolerance = if newton { tolerance } else { step.solver.cg.tolerance };
-        let (truth, error) = relative(step, !newton)?;
-        truth.is_finite().then_some(Self { truth, reported: step.solved.reported, tolerance, newton, error })
+        let (truth, error) = relative(step, !newton, contrast)?;
+        truth.is_finite().then_some(Self {
+            truth,
+            reported: step.solved.reported,
+            tolerance,
+            newton,
+            precision: step.solver.precision,
+            error,
+        })
     }
 
     fn threshold(&self) -> f64 {
-        let rounded = if self.newton { ROUNDED } else { 0.0 };
+        let rounded = match (self.newton, self.precision) {
+            (false, _) => 0.0,
+            (true, Precision::F32) => ROUNDED[0],
+            (true, Precision::F64) => ROUNDED[1],
+        };
         TIMES * self.tolerance.max(self.reported.min(EXCUSED)).max(rounded)
     }
 
@@ -73,10 +90,15 @@ impl Residual {
             ));
         }
         let key = if self.newton { "solver.newton.tolerance" } else { "solver.cg.tolerance" };
+        let cure = match self.precision {
+            Precision::F32 => {
+                "f32 cannot solve this any better; take solver.precision = \"f64\", or a looser tolerance and what it costs in accuracy"
+            }
+            Precision::F64 => "take smaller steps, or a smaller tolerance",
+        };
         (self.truth > self.threshold()).then(|| {
             format!(
-                "the last step's true residual is {:.1e}, where the solver reports {:.1e} and {key} is {:.1e}: f32 cannot solve this any \
-                 better; take solver.precision = \"f64\", or a looser tolerance and what it costs in accuracy",
+                "the last step's true residual is {:.1e}, where the solver reports {:.1e} and {key} is {:.1e}: {cure}",
                 self.truth, self.reported, self.tolerance
             )
         })
@@ -94,7 +116,7 @@ impl Residual {
 ///
 /// Of a linearised step it is that of the linear equations at the state before it. With it, of equilibrium, an estimate of the error
 /// of displacements.
-fn relative(step: &LastStep, is_linearised: bool) -> Option<(f64, Option<f64>)> {
+fn relative(step: &LastStep, is_linearised: bool, contrast: f64) -> Option<(f64, Option<f64>)> {
     let mut body = step.body.clone();
     body.contact = None;
     let backend = CpuBackend::<f64>::new(&body);
@@ -113,7 +135,9 @@ fn relative(step: &LastStep, is_linearised: bool) -> Option<(f64, Option<f64>)> 
         system.field.prepare(&system.backend, &end);
         system.field.add_diagonal(&system.backend, 1.0, &mut diagonal);
         system.backend.make_positive(&mut diagonal);
-        let error = correction(&mut system, &end, &residual, &diagonal);
+        let differ = contrast.max(spread(&system, &diagonal));
+        let is_doubtful = step.solver.precision == Precision::F32 || step.solver.newton.tolerance * differ > DOUBTFUL;
+        let error = if is_doubtful { correction(&mut system, &end, &residual, &diagonal) } else { None };
         return Some((ratio(&system, residual, diagonal, &[&inner]), error));
     }
     let [start, v, dv] = [&step.before[0], &step.before[1], &step.solved.change].map(|x| system.backend.upload(x));
@@ -152,6 +176,18 @@ fn relative(step: &LastStep, is_linearised: bool) -> Option<(f64, Option<f64>)> 
     }
     backend.axpy(1.0 / h + alpha, masses.diagonal()?, &mut diagonal);
     Some((ratio(&system, residual, diagonal, &[&inner, &inertia]), None))
+}
+
+/// The largest entry of a positive diagonal over the least, of free components: where a body is flattened or meshed unevenly they differ
+/// though its materials do not.
+fn spread(system: &System<CpuBackend<f64>, CpuField<f64>>, diagonal: &CpuVector<f64>) -> f64 {
+    let mut free = system.backend.zeros();
+    system.backend.copy(diagonal, &mut free);
+    system.backend.project(&mut free);
+    let entries = system.backend.download(&free);
+    let positive = entries.as_flattened().iter().filter(|x| **x > 0.0);
+    let [most, least] = positive.fold([0.0_f64, f64::INFINITY], |[most, least], x| [most.max(*x), least.min(*x)]);
+    if most > 0.0 { most / least } else { 1.0 }
 }
 
 /// What one more linear solution would add to a displacement at which the field is prepared, each the greatest of a component.

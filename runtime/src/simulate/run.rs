@@ -234,11 +234,11 @@ impl<'a, B: Backend + 'static, F: ForceField<B> + 'static> Run<'a, B, F> {
         let before = (may_miss && !explicit).then(|| self.copies());
         let solver = &self.scene.solver;
         let is_static = solver.integrator == scene::Integrator::Static;
-        let doubtful =
-            solver.precision == scene::Precision::F32 || is_static && self.guards.doubts(solver.newton.tolerance);
-        if k == self.steps && !explicit && doubtful {
+        let is_judged = is_static || solver.precision == scene::Precision::F32;
+        if k == self.steps && !explicit && is_judged {
+            // An equilibrium has no past.
             let [u, v] = [Some(&self.state.u), self.state.v.as_ref()]
-                .map(|x| x.map(|x| self.system.backend.download(x)).unwrap_or_default());
+                .map(|x| x.filter(|_| !is_static).map(|x| self.system.backend.download(x)).unwrap_or_default());
             self.before_last = Some([u, v]);
         }
         let mut stepped = self.integrator.step(&mut self.system, &mut self.state, self.step);

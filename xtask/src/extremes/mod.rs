@@ -36,11 +36,6 @@ What stops at these extremes goes on with a better method, and that is known: en
 motion has turned an element inside out (sub-steps until J is above .1, and a line search on the energy); explicit steps above the critical
 one have no remedy but a smaller step (or one that follows the stretch); equilibria of parts that differ a million times in stiffness need a
 stopping rule in the norm of the energy.
-
-What is wrong at the last making of this page, in two of some five thousand cells (each is named below its table): an equilibrium in f64 of a block compressed to a hundredth, where Newton's method met its tolerance by forces
-that the compressed volume makes a million times those of the shape, and no estimate of the error is made because materials at rest do not
-differ so much; and a linearised step in f32 from a flattened start: one linear solution a step asks for no convergence and nothing judges it
-(`solver.newton.max_iterations` above 1 is right there).
 ";
 
 /// Runs the suite and writes the page; with `--planted` the part of planted faults too, with `--gpu` on a GPU too.

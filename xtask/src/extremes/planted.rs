@@ -23,10 +23,10 @@ const FAULTS: [Fault; 4] = [
         to: "    let exact = <f64 as crate::ir::Number>::from_rational(q);\n    signed(format!(\"{exact:.3e}\").parse().unwrap_or(exact))\n",
     },
     Fault {
-        what: "series: the remainder of the logarithm has a wrong coefficient",
-        file: "codegen/src/remainder.rs",
-        from: "y * (self - 2.0 * z * sum)",
-        to: "y * (self - 1.99 * z * sum)",
+        what: "series: the second coefficient of the logarithm is .49",
+        file: "kernels/src/lanes/functions.rs",
+        from: "let half_square = V::from_f64(0.5) * f * f;",
+        to: "let half_square = V::from_f64(0.49) * f * f;",
     },
     Fault {
         what: "exit of conjugate gradients: a thousand times too early",

@@ -42,6 +42,10 @@ impl<B: Backend + 'static, F: ForceField<B> + 'static> Run<'_, B, F> {
         if *ending == Ending::Done {
             self.judge_residual();
         }
+        let solver = &self.scene.solver;
+        if !solver.integrator.is_explicit() && solver.newton.max_iterations == 1 {
+            self.guards.cut_short(self.cost.negative_curvature);
+        }
         // States of a simulation that blew up say nothing of its laws.
         if !matches!(ending, Ending::Failed(SolveError::Diverged { .. })) {
             let mut found = self.guards.after();
