@@ -187,7 +187,8 @@ impl TangentChoice {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Newton {
-    /// Stop when the residual's norm has fallen by this factor within the step; above 0, below 1.
+    /// Stop when the residual's norm has fallen by this factor within the step, in statics from the norm of what holds the body if that is
+    /// less; above 0, below 1.
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub tolerance: f64,
     /// Most iterations in one step, from 1 to 10000; 1 takes one linearised step and asks for no convergence.

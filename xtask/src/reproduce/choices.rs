@@ -34,17 +34,17 @@ const STUDIES: [Study; 5] = [
         scene: "bending",
         axis: "law",
         shows: "What a law is worth where a body is bent",
-        budget: "200",
+        budget: "120",
         found: "",
     },
     Study {
         scene: "torsion",
         axis: "law",
         shows: "What a law is worth where a body is turned",
-        budget: "120",
+        budget: "80",
         found: "",
     },
-    Study { scene: "traction", axis: "precision", shows: "f32 against f64", budget: "150", found: "" },
+    Study { scene: "traction", axis: "precision", shows: "f32 against f64", budget: "100", found: "" },
 ];
 
 const INTRODUCTION: &str = "\
