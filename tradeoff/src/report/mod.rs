@@ -96,7 +96,8 @@ impl<'a> Report<'a> {
         let metric = self.budget.metric;
         let uncertainty = self.study.reference.uncertainty().of(metric);
         let errors = self.study.measured.iter().filter_map(|m| Some(m.errors?.of(metric)));
-        let least = errors.fold(f64::INFINITY, f64::min);
+        // What computes the reference itself differs from it by nothing.
+        let least = errors.filter(|error| *error > 0.0).fold(f64::INFINITY, f64::min);
         let unrefined = &self.study.reference.unrefined;
         let also =
             if unrefined.is_empty() { String::new() } else { format!(" Not refined: {}.", unrefined.join("; ")) };
