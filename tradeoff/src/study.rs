@@ -76,40 +76,47 @@ pub struct Study {
     pub measured: Vec<Measured>,
     /// Whether it ended because nothing was left to run.
     pub is_exhausted: bool,
+    /// How many seconds it has taken, all calls together.
+    #[serde(default)]
+    pub taken: f64,
 }
 
 impl Study {
-    /// Goes on with the study in a folder, or begins it.
+    /// Goes on with the study in a folder, or begins it. What it has taken counts: the same call again changes nothing.
     ///
     /// # Errors
     /// See [`StudyError`].
     pub fn conduct(space: &Space, out: &Path, budget: Budget, follow: &mut dyn Follow) -> Result<Self, StudyError> {
         let (started, stop) = (Instant::now(), follow.stop());
-        let total = budget.total.as_secs_f64();
-        let used = || started.elapsed().as_secs_f64() / total;
         create_folder(out)?;
         let file = out.join("study.json");
         let key = format!("{} {}", env!("CARGO_PKG_VERSION"), serde_json::json!(**space.scene()));
-        let mut study = match read(&file) {
-            Some(study) if study.key == key => study,
-            Some(_) => return Err(StudyError::Other { path: file.display().to_string() }),
+        let known = match read(&file) {
+            Some(study) if study.key != key => return Err(StudyError::Other { path: file.display().to_string() }),
+            known => known,
+        };
+        let before = known.as_ref().map_or(0.0, |study| study.taken);
+        let taken = || before + started.elapsed().as_secs_f64();
+        let used = || taken() / budget.total.as_secs_f64();
+        let mut study = match known {
+            Some(study) => study,
             None => {
                 let points = points(space)?;
                 let within = budget.total.mul_f64(OF_REFERENCE);
                 let mut says = |text: &str| follow.does(text, used());
                 let reference = Reference::compute(space, &points, within, &stop, &mut says)?;
-                Self { key, reference, measured: vec![], is_exhausted: false }
+                Self { key, reference, measured: vec![], is_exhausted: false, taken: 0.0 }
             }
         };
-        write_json_atomic(&file, &serde_json::json!(study))?;
+        study.keep(&file, taken())?;
         let longest = budget.total.mul_f64(OF_SETTING);
-        study.is_exhausted = false;
         while used() < EXPLORES && !stop.load(Ordering::SeqCst) {
             let found = next(space, &study.measured, budget.metric, longest.as_secs_f64());
             let Some((setting, limit)) = found else {
                 study.is_exhausted = true;
                 break;
             };
+            study.is_exhausted = false;
             let left = budget.total.mul_f64((EXPLORES + 0.1 - used()).max(0.0));
             follow.does(&space.names(&setting).join(", "), used());
             let measured = study.measure(space, setting, left.min(Duration::from_secs_f64(limit)), &stop);
@@ -119,11 +126,17 @@ impl Study {
             // Of one that was stopped before only the longer time counts.
             study.measured.retain(|m| m.setting != setting);
             study.measured.push(measured);
-            write_json_atomic(&file, &serde_json::json!(study))?;
+            study.keep(&file, taken())?;
         }
         study.repeat(space, budget, &used, follow)?;
-        write_json_atomic(&file, &serde_json::json!(study))?;
+        study.keep(&file, taken())?;
         Ok(study)
+    }
+
+    /// Writes what a later call goes on with.
+    fn keep(&mut self, file: &Path, taken: f64) -> Result<(), OutputError> {
+        self.taken = taken;
+        write_json_atomic(file, &serde_json::json!(self))
     }
 
     /// Runs a setting.

@@ -23,7 +23,7 @@ Tasks:
   reproduce extremes measure the accuracy of every law, write docs/extremes.md
   reproduce convergence
                      measure the accuracy of every element, write docs/convergence.md
-  reproduce choices  measure what accuracy of four scenes costs, write docs/accuracy.md (7 minutes)
+  reproduce choices  measure what accuracy of four scenes costs, write docs/accuracy.md (18 minutes)
 
 Exit status: 0 done, 2 wrong arguments, 1 a step failed or is left to do (said on the error output).";
 
