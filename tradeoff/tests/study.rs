@@ -95,12 +95,11 @@ fn errors_are_relative() {
     assert!(Trajectory::of(&mesh, &outside, &[]).is_none());
 }
 
-/// The measured setting that differs from the scene's in one choice.
-fn alone<'a>(space: &Space, study: &'a Study, axis: Axis, name: &str) -> &'a Measured {
+/// The measured setting that differs from the scene's in one choice, if it was run.
+fn alone<'a>(space: &Space, study: &'a Study, axis: Axis, name: &str) -> Option<&'a Measured> {
     let k = space.choices(axis).iter().position(|c| c.name == name).unwrap_or_else(|| panic!("{name}"));
     let setting = space.base().with(axis, k);
-    let found = study.measured.iter().find(|m| m.setting == setting && m.status == Status::Done);
-    found.unwrap_or_else(|| panic!("{name} was not run"))
+    study.measured.iter().find(|m| m.setting == setting && m.status == Status::Done)
 }
 
 #[test]
@@ -110,8 +109,14 @@ fn a_study_finds_what_holds() {
     std::fs::write(&scene, BEAM).expect("written");
     let space = Space::of(&scene, &[], &[]).unwrap_or_else(|e| panic!("{e}"));
     let out = folder.path().join("out");
-    let (study, did) = conduct(&space, &out, 15.0);
+    let mut seconds = 15.0;
+    let (mut study, did) = conduct(&space, &out, seconds);
     assert!(did[0].starts_with("reference"), "{did:?}");
+    // What a budget is enough for depends on the machine and on what else it does.
+    while alone(&space, &study, Axis::Mesh, "x2").is_none() && seconds < 200.0 {
+        seconds *= 2.0;
+        study = conduct(&space, &out, seconds).0;
+    }
 
     // The scene's own setting comes first, then one axis at a time, each setting once.
     assert_eq!(study.measured[0].setting, space.base());
@@ -126,7 +131,9 @@ fn a_study_finds_what_holds() {
     assert!(study.measured.iter().all(|m| space.allows(&m.setting)));
 
     // A finer mesh is more accurate and dearer, and the reference is more certain than any of them.
-    let [coarse, fine] = ["x0.5", "x2"].map(|name| alone(&space, &study, Axis::Mesh, name));
+    let [coarse, fine] = ["x0.5", "x2"].map(|name| {
+        alone(&space, &study, Axis::Mesh, name).unwrap_or_else(|| panic!("{name} was not run in {seconds} s"))
+    });
     assert!(error(coarse) > 1.5 * error(fine), "{} and {}", error(coarse), error(fine));
     assert!(coarse.kernels < fine.kernels && coarse.bytes < fine.bytes);
     let uncertainty = study.reference.uncertainty().displacement;
@@ -135,7 +142,7 @@ fn a_study_finds_what_holds() {
     // The front is ordered, and what is recommended holds when it is run again, from the arguments that are printed.
     let best = front(&study.measured, Metric::Displacement);
     assert!(best.windows(2).all(|pair| pair[0].wall() <= pair[1].wall() && error(pair[0]) > error(pair[1])));
-    let report = Report::new(&space, &study, budget(15.0));
+    let report = Report::new(&space, &study, budget(seconds));
     let (target, found) = report.recommended()[1];
     assert_eq!(target, 0.05);
     let found = found.expect("5 % is reached");
@@ -159,15 +166,15 @@ fn a_study_finds_what_holds() {
     assert_eq!(json["settings"].as_array().map(Vec::len), Some(study.measured.len()));
     assert!(read("report.html").matches("<svg").count() >= 7, "diagrams");
     assert!(read("time-by-mesh.svg").starts_with("<svg"));
-    let (same, did) = conduct(&space, &out, 15.0);
+    let (same, did) = conduct(&space, &out, seconds);
     // Medians that have changed may want a run more, but no other setting is tried.
     assert!(did.iter().all(|text| text.starts_with("again: ")), "the same call has nothing else to do: {did:?}");
     let settings = |study: &Study| study.measured.iter().map(|m| m.setting).collect::<Vec<_>>();
     assert!(settings(&same) == settings(&study) && same.reference == study.reference && same.taken >= study.taken);
-    let (more, did) = conduct(&space, &out, 25.0);
+    let (more, did) = conduct(&space, &out, 1.6 * seconds);
     assert!(!did.iter().any(|text| text.starts_with("reference")), "{did:?}");
     assert!(more.measured.len() > study.measured.len() && more.reference == study.reference);
-    assert!(more.taken < 25.0, "{} s", more.taken);
+    assert!(more.taken < 1.6 * seconds, "{} s", more.taken);
 
     // Not the study of another scene.
     let other = Space::of(&scene, &["solver.duration=0.2".to_string()], &[]).unwrap_or_else(|e| panic!("{e}"));
