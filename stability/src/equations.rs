@@ -9,7 +9,8 @@ use tensormass_runtime::mesh::ElementId;
 use tensormass_runtime::model::Model;
 use tensormass_runtime::scene::{Integrator, Scene};
 
-/// The residual of the last step, as a part of the greatest of its terms: of inertia, of elements, of loads. None where there are not
+/// The residual of the last step, as a part of the greatest of its terms: of inertia, of elements, of loads; or how far an imposed
+/// component is from its place, as a part of the greatest displacement, if that is more. None where there are not
 /// the states for it, the law has a dissipation, or a step is linearised of a law that is not linear.
 ///
 /// `u` are the displacements (m) before, at the beginning and at the end of the last step; of equilibrium the last one counts.
@@ -35,10 +36,17 @@ pub fn residual(scene: &Scene, model: &Model, subject: &Subject, u: [&[[f64; 3]]
     }
     let seconds = scene.solver.step?;
     let unit = scale.density() * scale.length.powi(3);
+    let imposed = model.body.motions_at(step * steps as f64);
+    let greatest_move = u[2].as_flattened().iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     let mut held = vec![[false; 3]; nodes];
+    let mut misplaced = 0.0_f64;
     for c in &model.body.constraints {
-        held[c.node as usize][c.component as usize] = true;
+        let (node, component) = (c.node as usize, c.component as usize);
+        held[node][component] = true;
+        misplaced = misplaced.max((u[2][node][component] - scale.length * imposed[c.motion]).abs());
     }
+    // Where nothing moves nothing is misplaced.
+    let misplaced = if misplaced == 0.0 { 0.0 } else { misplaced / greatest_move };
     let (mut off, mut size) = (0.0_f64, greatest);
     for n in 0..nodes {
         for i in (0..3).filter(|i| !held[n][*i]) {
@@ -49,7 +57,7 @@ pub fn residual(scene: &Scene, model: &Model, subject: &Subject, u: [&[[f64; 3]]
             size = terms.iter().fold(size, |size, x| size.max(x.abs()));
         }
     }
-    Some(if off == 0.0 { 0.0 } else { off / size })
+    Some(misplaced.max(if off == 0.0 { 0.0 } else { off / size }))
 }
 
 /// Forces smaller than this part of what the displacements' gradient would cause, if it were strain, are roundings: a body that

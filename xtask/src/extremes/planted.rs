@@ -17,6 +17,12 @@ struct Fault {
 
 const FAULTS: [Fault; 4] = [
     Fault {
+        what: "constraint: the first one is left out",
+        file: "runtime/src/cpu/vectors.rs",
+        from: "let constraints = placed_constraints(body, &places);",
+        to: "let constraints: Vec<_> = placed_constraints(body, &places).into_iter().skip(1).collect();",
+    },
+    Fault {
         what: "kernel: printed constants have four digits",
         file: "codegen/src/print/rust/kernel.rs",
         from: "    signed(<f64 as crate::ir::Number>::from_rational(q))\n",
@@ -33,12 +39,6 @@ const FAULTS: [Fault; 4] = [
         file: "runtime/src/cg.rs",
         from: "s[TARGET] = s[TARGET] * s[REFERENCE];",
         to: "s[TARGET] = S::number(1e6) * s[TARGET] * s[REFERENCE];",
-    },
-    Fault {
-        what: "constraint: the first imposed component is left out",
-        file: "runtime/src/cpu/vectors.rs",
-        from: "    fn impose(&self, motions: &[f64], x: &mut Self::Vector) {\n        for c in &self.constraints {",
-        to: "    fn impose(&self, motions: &[f64], x: &mut Self::Vector) {\n        for c in self.constraints.iter().skip(1) {",
     },
 ];
 
@@ -59,6 +59,7 @@ pub fn section() -> Result<String, Failure> {
         if found.is_empty() {
             return Err(Failure::Step(format!("planted: no cell finds this fault: {}", fault.what)));
         }
+        say(&format!("{} cells are wrong", found.len()));
         let _ = writeln!(text, "| {} | {} |", fault.what, words(&found));
     }
     Ok(text)
