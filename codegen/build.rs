@@ -15,8 +15,10 @@ fn main() {
     files.sort();
     let mut list = String::from("&[\n");
     for path in files {
-        let name = path.file_stem().and_then(|stem| stem.to_str()).expect("a name in UTF-8").to_string();
-        list += &format!("    ({name:?}, include_str!({:?})),\n", path.display().to_string());
+        let name = path.file_stem().and_then(|stem| stem.to_str()).expect("a name in UTF-8");
+        let file = format!("/elements/{name}.toml");
+        // No absolute path: a target folder may serve a copy of the workspace elsewhere.
+        list += &format!("    ({name:?}, include_str!(concat!(env!(\"CARGO_MANIFEST_DIR\"), {file:?}))),\n");
     }
     list += "]\n";
     let out = env::var("OUT_DIR").expect("cargo tells where to write");
