@@ -3,20 +3,15 @@
 //! Manufactured solutions for a linear and a finite law, the deflection of the cantilever CANTI_SMALL, and frequencies of a
 //! bar with consistent and with lumped masses, in the places of displacement and energy.
 
-#[path = "../tests/support/elements.rs"]
-mod elements;
-#[path = "../tests/support/manufactured.rs"]
-mod manufactured;
-#[path = "../tests/support/mod.rs"]
+#[path = "../tests/all/support/mod.rs"]
+#[allow(dead_code)] // a part of what tests share
 mod support;
-#[path = "../tests/support/vibration.rs"]
-mod vibration;
 
-use elements::of_dimension;
-use manufactured::solve;
-use support::{CANTILEVER, body, done, parameters, probe, scene, system};
+use support::elements::of_dimension;
+use support::manufactured::solve;
+use support::vibration::{Frequency, frequency};
+use support::{CANTILEVER, done, probe, scene};
 use tensormass_runtime::laws;
-use vibration::{Frequency, frequency};
 
 fn main() {
     let linear = laws().iter().find(|l| l.info.structure.linear).expect("a linear law");

@@ -16,7 +16,7 @@ const INTRODUCTION: &str = "\
 # Stability at the extremes
 
 `cargo xtask extremes` writes this page: whole scenes of small bodies, each law of the build, each integrator, in f64 and f32 on the
-CPU; with `--gpu` one law of each kind at the ends of each range on a GPU besides, but for implicit steps without end (12 minutes on two
+CPU; with `--gpu` one law of each kind at the ends of each range on a GPU besides, but for a hundred thousand implicit steps (12 minutes on two
 cores where the GPU is software). `cargo test` runs a short form of it. A cell is the outcome of all laws:
 
 - a number alone: all are *right*, within this part of the greatest displacement (of reaction and energy too where the curve is exact).

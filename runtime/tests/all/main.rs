@@ -1,0 +1,40 @@
+//! The tests of the runtime, in one program: what they share is compiled once.
+
+mod support;
+
+mod batches;
+mod cantilever;
+mod cg;
+mod checkpoint;
+mod contact;
+mod convergence;
+mod damping;
+mod device;
+mod elements;
+mod failures;
+mod fibres;
+mod gpu_contact;
+mod gpu_kernels;
+mod gpu_modules;
+mod gpu_runs;
+mod guards;
+mod integrators;
+mod lanes;
+mod mass;
+mod mesh;
+mod output;
+mod patch;
+mod points;
+mod precision;
+mod pressure;
+mod requires;
+mod rigid;
+mod scene;
+mod scene_errors;
+mod solids;
+mod statics;
+mod steps;
+mod strips;
+mod tangents;
+mod traction;
+mod turns;
