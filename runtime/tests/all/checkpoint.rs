@@ -69,7 +69,7 @@ fn two_parts_are_the_whole() {
 #[test]
 fn two_parts_are_the_whole_on_a_gpu() {
     use tensormass_runtime::gpu::GpuOptions;
-    let Some(gpu) = support::gpu::test_device().map(std::sync::Arc::new) else { return };
+    let Some(gpu) = support::gpu::test_device() else { return };
     let target = Target::Gpu(gpu, GpuOptions::default());
     let text = bouncing("neo_hookean", "f32");
     check(&target, &text, &[]);

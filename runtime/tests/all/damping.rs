@@ -434,7 +434,7 @@ fn creep_of_a_bar_on_a_gpu() {
     use tensormass_runtime::gpu::GpuOptions;
     use tensormass_runtime::simulate::{Silent, run_on};
     use tensormass_runtime::target::Target;
-    let Some(gpu) = support::gpu::test_device().map(std::sync::Arc::new) else { return };
+    let Some(gpu) = support::gpu::test_device() else { return };
     let target = Target::Gpu(gpu, GpuOptions::default());
     let run = |scene: &Scene| run_on(&target, scene, None, &mut Silent).unwrap_or_else(|e| panic!("{e}"));
     creep(run, &["solver.precision=f32", "solver.cg.tolerance=1e-6", "solver.newton.tolerance=1e-5"], 1e-4);

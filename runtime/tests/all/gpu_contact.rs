@@ -110,7 +110,7 @@ fn meet<B: Backend>(
 
 #[test]
 fn responses_are_those_of_the_cpu() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     for shape in BELOW.into_iter().chain(MESHES).chain([DISH, MOVING]) {
         check_response(&gpu, shape);
     }
@@ -119,7 +119,7 @@ fn responses_are_those_of_the_cpu() {
 /// No step ends deeper than 4 roundings of the scene's size, as on the CPU; on a grid of distances than a hundredth of a cell.
 #[test]
 fn no_step_ends_inside() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     for shape in BELOW.into_iter().chain(MESHES).chain([DISH]) {
         let scene = falling(CUBE, shape, "neo_hookean", "f32", 2e-4, 0.06);
         let (mut device, mut touched) = (on_gpu(&gpu, &scene), 0);
@@ -148,7 +148,7 @@ fn no_step_ends_inside() {
 /// rough slope at .07 s, below the sphere when it goes across, at .24 s.)
 #[test]
 fn shipped_scenes_are_those_of_the_cpu() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let cases =
         [("torus-drop", 0.03), ("torus-slope-rough", 0.03), ("torus-slope-frictionless", 0.03), ("indentation", 0.06)];
     for (file, duration) in cases {
@@ -172,7 +172,7 @@ fn shipped_scenes_are_those_of_the_cpu() {
 /// anything look for nothing.
 #[test]
 fn runs_are_those_of_the_cpu() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     for shape in BELOW {
         let scene = falling(CUBE, shape, "st_venant_kirchhoff", "f32", 1e-4, 0.03);
         let (device, cpu) = (run(&gpu, &scene), done(&scene));

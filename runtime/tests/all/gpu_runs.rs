@@ -46,7 +46,7 @@ fn check(gpu: &Arc<Gpu>, name: &str, scene: &Scene, tolerance: f64, sizes: &[(&s
 /// supports carry nothing: that probe is compared with the force that stretches the beam.
 #[test]
 fn scenes_of_the_repository() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let coarse = "mesh.beam.cells=[10, 4, 4]";
     type Case<'a> = (&'a str, &'a [&'a str], &'a [(&'a str, f64)]);
     let cases: [Case; 6] = [
@@ -83,7 +83,7 @@ fn bent(law: &tensormass_runtime::LawEntry, solver: &str) -> String {
 /// strains is 1e-5 (docs/testing.md), and no more is asked.
 #[test]
 fn every_law_with_every_integrator() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let implicit = "step = 0.01\nduration = 0.06\ncg = { tolerance = 1e-6, max_iterations = 2000 }";
     let solvers = [
         "integrator = \"semi-implicit-euler\"\nstep = 5e-4\nduration = 0.06\nstiffness_damping = 1e-3".to_string(),
@@ -107,7 +107,7 @@ fn every_law_with_every_integrator() {
 /// Every element with every kind of integrator, as [`every_law_with_every_integrator`].
 #[test]
 fn every_element_with_every_kind_of_integrator() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let implicit = "step = 0.01\nduration = 0.04\ncg = { tolerance = 1e-6, max_iterations = 2000 }";
     let newton = "newton = { tolerance = 1e-5, max_iterations = 20 }";
     let solvers = [
@@ -130,7 +130,7 @@ fn every_element_with_every_kind_of_integrator() {
 /// has two passes over elements, an implicit solve brings the differential and the diagonal of both.
 #[test]
 fn passes_are_those_that_a_scene_needs() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let mesh = boxes_beside_wedges(3);
     let law = laws().iter().find(|law| !law.info.structure.linear && law.damping.is_none()).expect("such a law");
     let body = body(&mesh, law, &parameters(law), &[]);
@@ -151,7 +151,7 @@ fn passes_are_those_that_a_scene_needs() {
 /// The same run twice gives the same bits.
 #[test]
 fn reruns_are_identical() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let solver = "integrator = \"implicit-euler\"\nstep = 0.01\nduration = 0.03";
     for law in laws() {
         let scene = scene::<&str>(&bent(law, solver), &[]);
@@ -177,7 +177,7 @@ fn since(backend: &GpuBackend, before: Counts) -> Counts {
 /// status of 64 bytes at the end. Iterations after the last are submitted and do nothing.
 #[test]
 fn the_solver_reads_once_a_submission() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let mesh = beam([3.0, 1.0, 1.0], [6, 2, 2], [0.0; 3]).expect("a beam");
     let held: Vec<_> = (0..9).flat_map(|n| (0..3).map(move |c| (n, c, 0.0))).collect();
     for law in laws() {
@@ -225,7 +225,7 @@ fn the_solver_reads_once_a_submission() {
 /// besides, of a law with a domain, whether elements were inside.
 #[test]
 fn explicit_steps_read_once_a_stretch() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let solver = "integrator = \"semi-implicit-euler\"\nstep = 5e-4\nduration = ";
     for law in laws() {
         let reads_and_submits = |duration: &str| {
@@ -250,7 +250,7 @@ fn looking(gpu: &Arc<Gpu>, scene: &Scene, steps_between_checks: u32) -> Outcome 
 /// A run ends as it does where every state is looked at: with the same numbers, or with the same error at the same step.
 #[test]
 fn steps_that_nobody_looks_at_are_the_same() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let mut failed = 0;
     for law in laws() {
         for integrator in ["semi-implicit-euler", "central-difference"] {
@@ -301,7 +301,7 @@ fn a_lost_device_keeps_the_results() {
     ];
     for law in laws() {
         for solver in solvers {
-            let Some(gpu) = test_device().map(Arc::new) else { return };
+            let Some(gpu) = test_device() else { return };
             let scene = scene::<&str>(&bent(law, solver), &[]);
             let folder = tempfile::tempdir().expect("a temporary folder");
             let mut observer = Unplug(&gpu, 3);
@@ -327,7 +327,7 @@ fn a_lost_device_keeps_the_results() {
 /// Options that no device takes: the run is the same as with the nearest that all do.
 #[test]
 fn options_are_made_valid() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let scene = scene::<&str>(&bent(&laws()[0], "integrator = \"implicit-euler\"\nstep = 0.01\nduration = 0.02"), &[]);
     let probes = |work_group_size, least| {
         let (elements_per_invocation, iterations_per_submission) = (least, least);
@@ -349,7 +349,7 @@ fn options_are_made_valid() {
 
 #[test]
 fn f64_is_refused() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let scene =
         scene(&bent(&laws()[0], "integrator = \"static\"\nstep = 0.01\nduration = 0.06"), &["solver.precision=f64"]);
     let refused = run_on(&target(&gpu), &scene, None, &mut Silent);
@@ -359,7 +359,7 @@ fn f64_is_refused() {
 /// A vector over the nodes that the device cannot bind.
 #[test]
 fn a_body_beyond_the_limits_is_refused() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let limit = gpu.limits().storage_binding_bytes;
     // A device that binds more than this machine's memory holds has no such body to refuse.
     if limit > 1 << 30 {
@@ -377,7 +377,7 @@ fn a_body_beyond_the_limits_is_refused() {
 /// law does.
 #[test]
 fn kernels_are_compiled_once_for_a_device() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let compiled = |name: &str, set: &[&str]| {
         let law = laws().iter().find(|law| law.info.name == name).expect("a law of the build");
         let shorter = ["solver.step=0.01", "solver.duration=0.02"];

@@ -118,7 +118,7 @@ fn a_device_presses_as_the_cpu() {
     use tensormass_runtime::gpu::GpuOptions;
     use tensormass_runtime::simulate::{Silent, run_on};
     use tensormass_runtime::target::Target;
-    let Some(gpu) = support::gpu::test_device().map(Arc::new) else { return };
+    let Some(gpu) = support::gpu::test_device() else { return };
     let on_device = |scene: &Scene| {
         run_on(&Target::Gpu(Arc::clone(&gpu), GpuOptions::default()), scene, None, &mut Silent)
             .unwrap_or_else(|e| panic!("{e}"))

@@ -354,7 +354,7 @@ mod on_a_gpu {
     use tensormass_runtime::gpu::{GpuBackend, GpuField, GpuOptions};
 
     fn target() -> Option<Target> {
-        test_device().map(|gpu| Target::Gpu(Arc::new(gpu), GpuOptions::default()))
+        test_device().map(|gpu| Target::Gpu(gpu, GpuOptions::default()))
     }
 
     #[test]
@@ -365,7 +365,7 @@ mod on_a_gpu {
 
     #[test]
     fn explicit_steps_have_no_tangent() {
-        let Some(gpu) = test_device().map(Arc::new) else { return };
+        let Some(gpu) = test_device() else { return };
         // The zero vector, displacement, velocity, masses and load.
         for_explicit_steps(5, |body| {
             let backend = GpuBackend::new(Arc::clone(&gpu), body, GpuOptions::default()).expect("it fits");

@@ -189,9 +189,9 @@ fn wrong_surfaces_are_refused() {
     let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
     let sides = ["f 1 3 2\n", "f 1 2 4\n", "f 1 4 3\n", "f 2 3 4\n"];
     let cases = [
-        ("right.obj", corners.to_string() + &sides.concat(), ""),
-        ("open.obj", corners.to_string() + &sides[..3].concat(), "it is not closed: 3 sides of triangles"),
-        ("mixed.obj", corners.to_string() + &sides[..3].concat() + "f 2 4 3\n", "it is not closed: 6 sides"),
+        ("right.obj", format!("{corners}{}", sides.concat()), ""),
+        ("open.obj", format!("{corners}{}", sides[..3].concat()), "it is not closed: 3 sides of triangles"),
+        ("mixed.obj", format!("{corners}{}f 2 4 3\n", sides[..3].concat()), "it is not closed: 6 sides"),
         (
             "inward.obj",
             corners.to_string() + "f 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 4 3\n",
@@ -202,7 +202,7 @@ fn wrong_surfaces_are_refused() {
         ("infinite.obj", "v inf 0 0\nv 1 0 0\nv 2 1 0\nf 1 2 3\n".to_string(), "which is not finite"),
         ("torn.obj", corners.to_string() + "f 1 2 9\n", "is not a whole OBJ file: face vertex index out of bounds"),
         ("torn.stl", "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0".to_string(), "is not a whole STL file"),
-        ("short.stl", "\0".repeat(80) + "\x02\0\0\0" + &"\0".repeat(50), "is not a whole STL file"),
+        ("short.stl", format!("{}\x02\0\0\0{}", "\0".repeat(80), "\0".repeat(50)), "is not a whole STL file"),
         ("named.ply", "ply".to_string(), "is neither an STL nor an OBJ file by its name"),
     ];
     for (name, text, wanted) in cases {

@@ -1,7 +1,5 @@
 //! The domains of laws: an element outside is reported as the CPU reports it, elements inside are not.
 
-use std::sync::Arc;
-
 use tensormass_kernels::linear_tetrahedron;
 use tensormass_runtime::backend::{Backend, ForceField, LeftDomain};
 use tensormass_runtime::body::LawBatch;
@@ -46,7 +44,7 @@ fn torn(all: &Disjoint, element: u32) -> Vector {
 
 #[test]
 fn elements_outside_are_named_as_on_the_cpu() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let all: Vec<&'static LawEntry> = laws().iter().collect();
     let elements = Disjoint::new(&all, linear_tetrahedron(), (700, STRAIN), &Analysis::new(), &mut Rng::new(3));
     let options = [GpuOptions::default(), GpuOptions { binding_bytes: Some(1 << 13), ..GpuOptions::default() }];
@@ -78,7 +76,7 @@ fn elements_outside_are_named_as_on_the_cpu() {
 /// An element is outside where one of its points is.
 #[test]
 fn one_point_outside_is_enough() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let law = laws().iter().find(|law| law.info.domain.is_some()).expect("a law with a domain");
     for element in other_elements().filter(|e| e.info.points.len() > 1) {
         let all = Disjoint::new(&[law], element, (9, 0.1), &Analysis::new(), &mut Rng::new(9));

@@ -13,8 +13,8 @@ use tensormass_runtime::{LawEntry, laws, linear_tetrahedron};
 use tensormass_testing::random::Rng;
 
 use super::states::{
-    Analysis, Bound, Dealt, Kernel, Vector, batches, compare, in_pieces, in_turn, of_mesh, other_elements,
-    representatives, single, vectors,
+    Analysis, Bound, DEALT, Dealt, Kernel, Vector, batches, compare, in_pieces, in_turn, of_mesh, other_elements,
+    representatives, single, two_laws, vectors,
 };
 use super::{On, on_cpu, on_gpu};
 use crate::support::elements::{boxes_beside_wedges, distorted, renumbered, unit};
@@ -183,7 +183,7 @@ fn product<B: Backend, F: ForceField<B>>(
 
 #[test]
 fn sums_keep_masks() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let body = Shared::new(8);
     let On { backend, mut field } = on_gpu(&gpu, &body.body, GpuOptions::default());
     let (u, mut f) = (backend.upload(&body.u), backend.zeros());
@@ -238,7 +238,7 @@ fn check(gpu: &Arc<Gpu>, body: &Shared, options: GpuOptions, analysis: &Analysis
 
 #[test]
 fn sums_at_nodes_are_those_of_f64_rounded() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let (body, analysis) = (Shared::new(5), Analysis::new());
     for (least, binding_bytes) in [(1, None), (3, Some(SMALL))] {
         let run = || check(&gpu, &body, GpuOptions { binding_bytes, ..GpuOptions::default() }, &analysis, least);
@@ -250,7 +250,7 @@ fn sums_at_nodes_are_those_of_f64_rounded() {
 /// Where nodes are numbered at random, elements and nodes have an order of their own.
 #[test]
 fn sums_of_any_numbering_are_those_of_f64_rounded() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let mesh = beam([5.0, 2.0, 2.0], [12, 6, 6], [0.5, -1.0, 2.0]).expect("a beam");
     let laws = representatives();
     let places = |body: &Body| DeviceOrder::of(body).places;
@@ -265,7 +265,7 @@ fn sums_of_any_numbering_are_those_of_f64_rounded() {
 /// Three elements in a row an invocation, where there are many of a law; the numbers of each element, too.
 #[test]
 fn sums_of_strips_are_those_of_f64_rounded() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let analysis = Analysis::new();
     let mesh = distorted(&unit(linear_tetrahedron(), 11), 0.2, 9);
     let laws = representatives();
@@ -294,12 +294,12 @@ fn sums_of_strips_are_those_of_f64_rounded() {
     }
 }
 
-/// Any element, and two kinds that share nodes; of laws that between them have all that passes know of a law.
+/// Any element, and two kinds that share nodes: how slots are summed is the same of all laws.
 #[test]
 fn sums_of_every_element_are_those_of_f64_rounded() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let analysis = Analysis::new();
-    let laws = representatives();
+    let laws = two_laws();
     let mixed = distorted(&boxes_beside_wedges(3), 0.3, 17);
     for mesh in other_elements().map(|element| distorted(&unit(element, 3), 0.3, 5)).chain([mixed]) {
         let kinds: Vec<&str> = mesh.blocks().iter().map(|b| b.info().name).collect();
@@ -319,7 +319,7 @@ fn sums_of_every_element_are_those_of_f64_rounded() {
 /// The same with the consistent mass, of two kinds that share nodes.
 #[test]
 fn products_with_the_consistent_mass_are_those_of_f64_rounded() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let body = with_matrix();
     check(&gpu, &body, GpuOptions::default(), &Analysis::new(), 1);
     let mut on = on_gpu(&gpu, &body.body, GpuOptions::default());
@@ -329,7 +329,7 @@ fn products_with_the_consistent_mass_are_those_of_f64_rounded() {
 /// A body with a consistent mass of numbers of f32.
 fn with_matrix() -> Shared {
     let mesh = distorted(&boxes_beside_wedges(3), 0.3, 17);
-    let mut shared = Shared::of(&mesh, &representatives(), 0.005, 5);
+    let mut shared = Shared::of(&mesh, &two_laws(), 0.005, 5);
     let mut matrix = MassMatrix::assemble(&mesh, &vec![1.0; mesh.len()], 1.0).expect("a small mesh");
     matrix.values.iter_mut().for_each(|value| *value = single(*value));
     shared.body.mass_matrix = Some(matrix);
@@ -338,7 +338,7 @@ fn with_matrix() -> Shared {
 
 #[test]
 fn a_solver_that_has_stopped_is_left_alone() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let body = Shared::new(6);
     for binding_bytes in [None, Some(SMALL)] {
         let mut on = on_gpu(&gpu, &body.body, GpuOptions { binding_bytes, ..GpuOptions::default() });
@@ -350,14 +350,13 @@ fn a_solver_that_has_stopped_is_left_alone() {
 
 #[test]
 fn sums_do_not_depend_on_how_elements_are_dealt_to_invocations() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
-    let body = Shared::new(7);
+    let Some(gpu) = test_device() else { return };
+    let mesh = beam([4.0, 1.0, 1.5], [8, 3, 3], [0.5, -1.0, 2.0]).expect("a beam");
+    let body = Shared::of(&mesh, &two_laws(), 0.02, 7);
     let force = |options| on_gpu(&gpu, &body.body, options).fresh(Kernel::Force, &body.u, &body.du);
     let usual = force(GpuOptions::default());
-    for work_group_size in [32, 64, 128, 256] {
-        for elements_per_invocation in [1, 2, 3, 7] {
-            let options = GpuOptions { work_group_size, elements_per_invocation, ..GpuOptions::default() };
-            assert!(force(options) == usual, "{options:?}");
-        }
+    for (work_group_size, elements_per_invocation) in DEALT {
+        let options = GpuOptions { work_group_size, elements_per_invocation, ..GpuOptions::default() };
+        assert!(force(options) == usual, "{options:?}");
     }
 }

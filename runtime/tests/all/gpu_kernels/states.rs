@@ -48,6 +48,18 @@ pub fn representatives() -> Vec<&'static LawEntry> {
     chosen
 }
 
+/// Of these one with a dissipation and one without, for what is the same of all laws: drivers take a second for a kernel.
+pub fn two_laws() -> Vec<&'static LawEntry> {
+    let all = representatives();
+    [true, false]
+        .into_iter()
+        .filter_map(|damped| all.iter().copied().find(|law| law.damping.is_some() == damped))
+        .collect()
+}
+
+/// Sizes of work groups, and how many elements an invocation computes: each of both twice.
+pub const DEALT: [(u32, u32); 8] = [(32, 1), (32, 7), (64, 2), (64, 1), (128, 3), (128, 2), (256, 7), (256, 3)];
+
 /// A number as WGSL computes it.
 pub type Bound = Bounded<Wgsl>;
 /// Three components a node.

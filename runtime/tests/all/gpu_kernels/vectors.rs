@@ -142,7 +142,7 @@ impl Case {
 
 #[test]
 fn operations_are_those_of_f64_rounded_and_keep_masks() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     for case in NODES.map(|nodes| Case::new(&gpu, nodes)) {
         let b = &case.backend;
         let (x, d) = (b.upload(&case.x), b.upload(&case.d));
@@ -162,7 +162,7 @@ fn operations_are_those_of_f64_rounded_and_keep_masks() {
 /// Motions of several impositions travel with one submission, each with its own values; and beyond what one takes.
 #[test]
 fn impositions_in_one_submission_have_their_own_values() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     let case = Case::new(&gpu, 100);
     for impositions in [3, 700] {
         let b = &case.backend;
@@ -184,7 +184,7 @@ fn impositions_in_one_submission_have_their_own_values() {
 
 #[test]
 fn scalar_products_and_maxima() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     for case in NODES.map(|nodes| Case::new(&gpu, nodes)) {
         let b = &case.backend;
         let (x, y, what) = (b.upload(&case.x), b.upload(&case.y), format!("x . y, {} nodes", case.x.len()));
@@ -231,7 +231,7 @@ impl Update for Recurrence {
 
 #[test]
 fn a_descent_a_turn_and_a_recurrence() {
-    let Some(gpu) = test_device().map(Arc::new) else { return };
+    let Some(gpu) = test_device() else { return };
     for (case, running) in NODES.iter().flat_map(|&nodes| [1.0, 0.0].map(|on| (Case::new(&gpu, nodes), on))) {
         let b = &case.backend;
         let (d, q, preconditioner) = (b.upload(&case.x), b.upload(&case.y), b.upload(&case.d));
