@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 use tensormass_runtime::elements;
-use tensormass_runtime::scene::Integrator;
+use tensormass_runtime::scene::{Integrator, Mesh};
 
 use crate::experiment::{Finished, Status, bare, run};
 use crate::space::{Axis, Setting, Space, SpaceError};
@@ -145,9 +145,9 @@ impl Reference {
             checks.push(Check { what, mesh: Some(level), difference });
             (finest, changes, wall) = (next, finer, run.wall);
         }
-        if levels == 1 {
-            unrefined.push("the mesh: it is a file; errors are those on this mesh".into());
-        } else if !checks.iter().any(|check| check.mesh.is_some()) {
+        // What is coarsest of a file is the scene's own mesh: a budget that has no more is still worth a study on it.
+        let is_file = matches!(space.scene().mesh, Mesh::File { .. });
+        if !is_file && !checks.iter().any(|check| check.mesh.is_some()) {
             return Err(ReferenceError::Run {
                 reason: format!("the budget is too small to refine its mesh ({wall:.1} s for the coarsest)"),
                 remedy: "give a larger --budget, or a coarser scene",

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use tensormass_runtime::model::{BuildError, Model, build};
 use tensormass_runtime::moduli::moduli;
-use tensormass_runtime::scene::{Integrator, Mesh, Override, Parameter, ParameterValue, Scene, SceneError, load};
+use tensormass_runtime::scene::{
+    Integrator, MOST_PARTS, Mesh, Override, Parameter, ParameterValue, Scene, SceneError, load,
+};
 use tensormass_runtime::step_limit::element_limit;
 use tensormass_runtime::{elements, laws};
 
@@ -321,7 +323,8 @@ fn element_choices(scene: &Scene) -> (Vec<Choice>, usize) {
     (fitting.iter().map(choice).collect(), base)
 }
 
-/// A made mesh with a quarter as many to four times as many cells each way; the last is for references.
+/// A made mesh with a quarter as many to four times as many cells each way, a file's with as many parts of its elements as make these;
+/// the last is for references.
 fn mesh_choices(scene: &Scene) -> (Vec<Choice>, usize) {
     let factors = [(1, 4), (1, 2), (1, 1), (2, 1), (4, 1)];
     let scaled = |n: u32, (times, over): (u32, u32)| (n * times / over).max(1);
@@ -344,6 +347,13 @@ fn mesh_choices(scene: &Scene) -> (Vec<Choice>, usize) {
             };
             (factors.into_iter().map(of).collect(), 2)
         }
-        Mesh::File { .. } => (vec![Choice { name: "file".into(), changes: vec![] }], 0),
+        Mesh::File { refine, .. } => {
+            // What a file has cannot be made coarser; more parts than scenes may ask for are refused.
+            let fits = |(times, over): &(u32, u32)| refine.is_multiple_of(*over) && refine * times / over <= MOST_PARTS;
+            let fitting: Vec<(u32, u32)> = factors.into_iter().filter(fits).collect();
+            let own = fitting.iter().position(|f| *f == (1, 1)).unwrap_or(0);
+            let of = |f| choice(vec![format!("mesh.refine={}", scaled(*refine, f))], f);
+            (fitting.into_iter().map(of).collect(), own)
+        }
     }
 }

@@ -12,6 +12,8 @@ pub enum GroupKind {
     Element,
     /// A set of faces.
     Face,
+    /// A set of edges.
+    Edge,
 }
 
 impl fmt::Display for GroupKind {
@@ -20,6 +22,7 @@ impl fmt::Display for GroupKind {
             GroupKind::Node => "node",
             GroupKind::Element => "element",
             GroupKind::Face => "face",
+            GroupKind::Edge => "edge",
         })
     }
 }

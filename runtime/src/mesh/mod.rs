@@ -10,6 +10,7 @@ mod locate;
 mod map;
 mod parts;
 mod quality;
+mod refine;
 pub mod surface;
 mod topology;
 mod torus;

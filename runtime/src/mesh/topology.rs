@@ -63,6 +63,8 @@ pub struct Groups {
     /// Sets of faces, each one of at least one element, by all its nodes. A face of the boundary is given the order of
     /// nodes that its element has: outward.
     pub faces: BTreeMap<String, Vec<Vec<NodeId>>>,
+    /// Sets of edges by their ends: those of groups of nodes along curves. [`Mesh::refined`] alone needs them.
+    pub edges: BTreeMap<String, Vec<[NodeId; 2]>>,
 }
 
 /// Elements of one kind.

@@ -188,6 +188,11 @@ pub(super) fn groups(groups: &mut Groups, mesh: &Mesh) -> Result<(), MeshError> 
             return out_of_range(GroupKind::Face, name, GroupKind::Node, node.0, nodes);
         }
     }
+    for (name, group) in &groups.edges {
+        if let Some(node) = group.iter().flatten().find(|node| node.index() >= nodes) {
+            return out_of_range(GroupKind::Edge, name, GroupKind::Node, node.0, nodes);
+        }
+    }
     if groups.faces.values().all(Vec::is_empty) {
         return Ok(());
     }

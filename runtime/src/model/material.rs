@@ -43,9 +43,8 @@ pub struct Assignment {
     of_element: Vec<usize>,
 }
 
-/// Assigns materials to elements: each element exactly one.
-pub fn assign(scene: &Scene, mesh: &Mesh, places: &Places) -> Result<Assignment, SceneError> {
-    let count = mesh.len();
+/// Assigns materials to the elements of a mesh: each element exactly one. `parts` elements are of each that the scene gives values for.
+pub fn assign(scene: &Scene, places: &Places, (count, parts): (usize, usize)) -> Result<Assignment, SceneError> {
     let mut of_element: Vec<Option<usize>> = vec![None; count];
     let mut entries = Vec::new();
     for (i, material) in scene.material.iter().enumerate() {
@@ -63,7 +62,7 @@ pub fn assign(scene: &Scene, mesh: &Mesh, places: &Places) -> Result<Assignment,
         };
         let path = format!("material.{i}.elements");
         let members = places.elements(scene, &path, &material.elements)?;
-        let values = parameters::read(scene, i, material, law, count)?;
+        let values = parameters::read(scene, i, material, law, (count / parts, parts))?;
         let name = material.name.clone().unwrap_or_else(|| format!("material {}", i + 1));
         for &e in &members {
             if let Some(other) = of_element[e as usize] {

@@ -94,7 +94,7 @@ pub fn build(scene: &Scene) -> Result<Model, BuildError> {
         ));
     }
     let places = Places::new(&mesh);
-    let assignment = material::assign(scene, &mesh, &places)?;
+    let assignment = material::assign(scene, &places, (mesh.len(), parts_of_each(scene, &mesh)))?;
     let [low, high] = mesh.bounding_box();
     let diagonal = (0..3).map(|i| (high[i] - low[i]).powi(2)).sum::<f64>().sqrt();
     let scale = Scale::new(diagonal, assignment.stiffness(), assignment.density());
@@ -188,19 +188,28 @@ fn load_mesh(scene: &Scene, warnings: &mut Vec<String>) -> Result<Mesh, BuildErr
             let made = mesh::torus_of(element, ring, [torus.across, torus.around].map(|n| n as usize));
             made.map_err(|e| not_made(scene, "mesh.torus", &e).into())
         }
-        scene::Mesh::File { file, orient, scale } => {
+        scene::Mesh::File { file, orient, scale, refine } => {
             let orientation = if *orient { Orientation::Repair } else { Orientation::Refuse };
             let loaded = gmsh::read(&scene.resolve(file), orientation)?;
             warnings.extend(loaded.warnings);
-            if *scale == 1.0 {
-                return Ok(loaded.mesh);
+            let mut mesh = loaded.mesh;
+            if *scale != 1.0 {
+                let nodes = mesh.nodes().iter().map(|p| p.map(|x| x * scale)).collect();
+                mesh = mesh
+                    .moved(nodes)
+                    .map_err(|e| SceneError::at(scene.locate("mesh.scale"), e.to_string(), "choose another scale"))?;
             }
-            let nodes = loaded.mesh.nodes().iter().map(|p| p.map(|x| x * scale)).collect();
-            loaded
-                .mesh
-                .moved(nodes)
-                .map_err(|e| SceneError::at(scene.locate("mesh.scale"), e.to_string(), "choose another scale").into())
+            mesh.refined(*refine as usize)
+                .map_err(|e| SceneError::at(scene.locate("mesh.refine"), e.to_string(), "choose fewer parts").into())
         }
+    }
+}
+
+/// How many elements of the mesh are parts of each element that the scene gives.
+fn parts_of_each(scene: &Scene, mesh: &Mesh) -> usize {
+    match &scene.mesh {
+        scene::Mesh::File { refine, .. } => (*refine as usize).pow(mesh.blocks()[0].info().dimension as u32),
+        scene::Mesh::Beam { .. } | scene::Mesh::Torus { .. } => 1,
     }
 }
 

@@ -7,26 +7,28 @@ use crate::scene::{Material, Parameter, ParameterValue, PerElement, Scene, Scene
 /// The values of all parameters of a material, in the law's units.
 #[derive(Debug, Clone)]
 pub struct Values {
-    /// One row of all components, or one an element of the mesh.
+    /// One row of all components, or one an element that the scene gives.
     pub rows: Vec<Vec<f64>>,
     /// Whether there is a row an element.
     pub per_element: bool,
+    /// How many elements of the mesh are parts of each of these.
+    pub parts: usize,
 }
 
 impl Values {
     /// The row of an element of the mesh.
     pub fn row(&self, element: u32) -> &[f64] {
-        if self.per_element { &self.rows[element as usize] } else { &self.rows[0] }
+        if self.per_element { &self.rows[element as usize / self.parts] } else { &self.rows[0] }
     }
 }
 
-/// Reads the parameters of material `index`.
+/// Reads the parameters of material `index`, of a mesh of so many elements, each so many parts.
 pub fn read(
     scene: &Scene,
     index: usize,
     material: &Material,
     law: &LawEntry,
-    elements: usize,
+    (elements, parts): (usize, usize),
 ) -> Result<Values, SceneError> {
     let base = format!("material.{index}");
     let names: Vec<&str> = law.info.parameters.iter().map(|p| p.name).collect();
@@ -41,12 +43,12 @@ pub fn read(
     }
     let mut columns = Vec::new();
     for info in law.info.parameters {
-        columns.push(column(scene, &base, material, law, info, elements)?);
+        columns.push(column(scene, &base, material, law, info, (elements, parts))?);
     }
     let per_element = columns.iter().any(|c| c.len() > 1);
     let rows = if per_element { elements } else { 1 };
     let row = |e: usize| columns.iter().flat_map(|c| c[if c.len() > 1 { e } else { 0 }].iter().copied()).collect();
-    Ok(Values { rows: (0..rows).map(row).collect(), per_element })
+    Ok(Values { rows: (0..rows).map(row).collect(), per_element, parts })
 }
 
 /// The values of one parameter: one, or one an element.
@@ -56,7 +58,7 @@ fn column(
     material: &Material,
     law: &LawEntry,
     info: &ParameterInfo,
-    elements: usize,
+    (elements, parts): (usize, usize),
 ) -> Result<Vec<Vec<f64>>, SceneError> {
     let path = format!("{base}.parameters.{}", info.name);
     let mut values = match material.parameters.get(info.name) {
@@ -88,7 +90,10 @@ fn column(
         return Err(SceneError::at(
             scene.locate(&path),
             format!("there are {} values for {elements} elements", values.len()),
-            "give one value for each element of the mesh, in the mesh's order",
+            format!(
+                "give one value for each element of the mesh, in the mesh's order{}",
+                if parts > 1 { ", as it is before it is refined" } else { "" }
+            ),
         ));
     }
     for (e, value) in values.iter_mut().enumerate() {

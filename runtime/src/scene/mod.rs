@@ -26,8 +26,8 @@ mod suggest;
 
 pub use error::{Fault, Location, SceneError};
 pub use model::{
-    About, Axis, Beam, Boundary, History, Initial, Load, Material, Mesh, Motion, Parameter, ParameterValue, PerElement,
-    Ramp, SceneData, Torus,
+    About, Axis, Beam, Boundary, History, Initial, Load, MOST_PARTS, Material, Mesh, Motion, Parameter, ParameterValue,
+    PerElement, Ramp, SceneData, Torus,
 };
 pub use obstacle::{Angle, Friction, Obstacle, Rod, Rotate, Shape, Surface};
 pub use output::{Component, EnergyPart, Field, Output, Probe, Statistic, StressComponent};

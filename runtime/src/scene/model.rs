@@ -56,6 +56,9 @@ pub struct About {
     pub title: Option<String>,
 }
 
+/// The most parts into which an edge of an element of a file may be cut.
+pub const MOST_PARTS: u32 = 16;
+
 /// Where the nodes and elements come from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged, deny_unknown_fields)]
@@ -82,6 +85,10 @@ pub enum Mesh {
         #[serde(default = "one")]
         #[schemars(range(min = 1e-9, max = 1e9))]
         scale: f64,
+        /// Number of parts into which each edge of an element is cut, from 1 to 16: 2 makes 8 elements of each solid one.
+        #[serde(default = "once")]
+        #[schemars(range(min = 1, max = MOST_PARTS))]
+        refine: u32,
     },
 }
 
@@ -439,4 +446,8 @@ pub struct Initial {
 
 fn one() -> f64 {
     1.0
+}
+
+fn once() -> u32 {
+    1
 }

@@ -2,6 +2,7 @@
 
 mod files;
 mod gmsh;
+mod refine;
 mod refused;
 
 use std::collections::BTreeMap;
@@ -304,6 +305,7 @@ fn groups_are_normalised() {
         elements: BTreeMap::from([("e".to_owned(), [1, 0, 1].map(ElementId).to_vec())]),
         // Inward, repeated in another order, and an interior face, whose orientation is the caller's.
         faces: BTreeMap::from([("f".to_owned(), faces(&[[0, 1, 2], [2, 0, 1], [1, 2, 3]]))]),
+        edges: BTreeMap::new(),
     };
     let mesh = Mesh::tetrahedra(two.nodes().to_vec(), two.tets().to_vec(), groups).expect("a valid mesh");
     assert_eq!(mesh.node_group("n"), Some(&[NodeId(1), NodeId(3)][..]));

@@ -61,8 +61,9 @@ fn shipped_scenes_say_what_the_paper_says() {
 #[test]
 fn defaults_and_all_forms_of_parameters() {
     let scene = parse(SMALL, "folder/small.toml", &[]).unwrap_or_else(|error| panic!("{error}"));
-    let Mesh::File { file, orient, scale } = &scene.mesh else { panic!("a mesh file") };
+    let Mesh::File { file, orient, scale, refine } = &scene.mesh else { panic!("a mesh file") };
     assert_eq!((scene.resolve(file), *orient, *scale), (PathBuf::from("folder/meshes/cube.msh"), false, 1.0));
+    assert_eq!(*refine, 1);
     let parameters = &scene.material[0].parameters;
     let numbers = [1.0, 2.5].map(ParameterValue::Number).to_vec();
     assert_eq!(parameters["young"], Parameter::PerElement { per_element: PerElement::Values(numbers) });

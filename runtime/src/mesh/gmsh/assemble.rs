@@ -215,6 +215,11 @@ fn collect_groups(raw: &Raw, places: &Places, numbers: &Numbers, warnings: &mut 
             if dimension + 1 == numbers.body {
                 let faces = elements.iter().map(|place| numbers.faces[*place].clone());
                 groups.faces.entry(name.clone()).or_default().extend(faces);
+            } else if dimension == 1 {
+                // The ends of a line come first in Gmsh's order.
+                let node = |place: &usize| numbers.ids[*place];
+                let ends = |line: &usize| Some([node(&places[1][*line][0])?, node(&places[1][*line][1])?]);
+                groups.edges.entry(name.clone()).or_default().extend(elements.iter().filter_map(ends));
             }
             groups.nodes.entry(name).or_default().extend(nodes);
         }

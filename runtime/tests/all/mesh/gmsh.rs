@@ -117,6 +117,7 @@ fn both_versions_give_the_same_mesh() {
         assert_eq!(mesh.node_group_names().collect::<Vec<_>>(), ["base plate", "edge", "tip"], "{version}");
         assert_eq!(nodes("base plate"), Some(vec![0, 1, 2]), "{version}");
         assert_eq!(nodes("edge"), Some(vec![0, 1]), "{version}");
+        assert_eq!(mesh.groups().edges["edge"], [[NodeId(0), NodeId(1)]], "{version}");
         assert_eq!(nodes("tip"), Some(vec![4]), "{version}");
         assert_eq!(mesh.face_group_names().collect::<Vec<_>>(), ["base plate"], "{version}");
         assert_eq!(mesh.face_group("base plate"), Some(&faces(&[[0, 2, 1]])[..]), "{version}: outward");
