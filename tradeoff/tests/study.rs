@@ -102,6 +102,34 @@ fn alone<'a>(space: &Space, study: &'a Study, axis: Axis, name: &str) -> Option<
     study.measured.iter().find(|m| m.setting == setting && m.status == Status::Done)
 }
 
+/// What is finer of a mesh file has its elements in parts; nothing is coarser, but of a scene that has parts itself.
+#[test]
+fn a_mesh_file_is_cut_into_parts() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = folder.path().join("file.toml");
+    let mesh = concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/tests/data/extruded_4.msh");
+    let rest = BEAM.split_once("[[material]]").expect("a material").1;
+    std::fs::write(&scene, format!("[mesh]\nfile = {mesh:?}\n[[material]]{rest}")).expect("written");
+    let changes = ["solver.integrator=static".to_string(), "solver.step=0.1".to_string()];
+    let space = Space::of(&scene, &changes, &[]).unwrap_or_else(|e| panic!("{e}"));
+    let names = |space: &Space| space.choices(Axis::Mesh).iter().map(|c| c.name.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&space), ["x1", "x2", "x4"]);
+    let (study, _) = conduct(&space, &folder.path().join("out"), 20.0);
+    assert!(study.reference.checks.iter().any(|check| check.mesh.is_some()), "{:?}", study.reference.unrefined);
+    let own = study.measured.iter().find(|m| m.setting == space.base()).expect("the scene's own");
+    let finer = alone(&space, &study, Axis::Mesh, "x2").expect("it is measured");
+    assert!(error(own) > 1.3 * error(finer), "{} and {}", error(own), error(finer));
+
+    for (refine, wanted) in
+        [(4, &["x0.25", "x0.5", "x1", "x2", "x4"][..]), (6, &["x0.5", "x1", "x2"]), (16, &["x0.25", "x0.5", "x1"])]
+    {
+        let changes = [&changes[..], &[format!("mesh.refine={refine}")]].concat();
+        let space = Space::of(&scene, &changes, &[]).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(names(&space), wanted, "{refine}");
+        assert_eq!(space.choices(Axis::Mesh)[space.base().on(Axis::Mesh)].name, "x1");
+    }
+}
+
 #[test]
 fn a_study_finds_what_holds() {
     let folder = tempfile::tempdir().expect("a folder");

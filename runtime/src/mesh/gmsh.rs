@@ -1,8 +1,8 @@
 //! Reader of Gmsh meshes: .msh 2.2 and 4.1, ASCII, with physical groups.
 //!
 //! Physical volumes become element groups, physical surfaces become face groups and the groups of their nodes, and
-//! physical curves and points become node groups. Nodes are numbered in the order of their Gmsh tags, elements in the
-//! order of the file.
+//! physical curves and points become node groups (curves keep their edges). Nodes are numbered in the order of their Gmsh
+//! tags, elements in the order of the file.
 
 mod assemble;
 mod element_type;

@@ -199,8 +199,10 @@ fn load_mesh(scene: &Scene, warnings: &mut Vec<String>) -> Result<Mesh, BuildErr
                     .moved(nodes)
                     .map_err(|e| SceneError::at(scene.locate("mesh.scale"), e.to_string(), "choose another scale"))?;
             }
-            mesh.refined(*refine as usize)
-                .map_err(|e| SceneError::at(scene.locate("mesh.refine"), e.to_string(), "choose fewer parts").into())
+            if *refine == 1 {
+                return Ok(mesh);
+            }
+            mesh.refined(*refine as usize).map_err(|e| not_made(scene, "mesh.refine", &e).into())
         }
     }
 }

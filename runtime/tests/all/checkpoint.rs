@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::support::contact::{BELOW, CUBE, falling_text};
-use crate::support::{self, overrides, scene};
+use crate::support::{overrides, scene};
 use tensormass_runtime::scene::{Scene, parse};
 use tensormass_runtime::simulate::{Checkpoint, Ending, RunError, Silent, run_from};
 use tensormass_runtime::target::Target;
@@ -69,7 +69,7 @@ fn two_parts_are_the_whole() {
 #[test]
 fn two_parts_are_the_whole_on_a_gpu() {
     use tensormass_runtime::gpu::GpuOptions;
-    let Some(gpu) = support::gpu::test_device() else { return };
+    let Some(gpu) = crate::support::gpu::test_device() else { return };
     let target = Target::Gpu(gpu, GpuOptions::default());
     let text = bouncing("neo_hookean", "f32");
     check(&target, &text, &[]);

@@ -1,6 +1,5 @@
 //! Devices: how a choice is read, the rule that picks one, messages with remedies, and devices that fail.
 
-#[cfg(feature = "gpu")]
 use tensormass_runtime::device::{
     DeviceChoice, DeviceError, DeviceFeatures, DeviceInfo, DeviceKind, DeviceLimits, select,
 };

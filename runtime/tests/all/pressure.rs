@@ -1,6 +1,6 @@
 //! Pressure: its resultants on closed surfaces, its work, a body that it presses on all sides, and a device.
 
-use crate::support::{self, Random, done, probe, scene};
+use crate::support::{Random, done, probe, scene};
 use tensormass_runtime::body::PressedFace;
 use tensormass_runtime::elements;
 use tensormass_runtime::mesh::{Mesh, beam_of, tangents};
@@ -118,7 +118,7 @@ fn a_device_presses_as_the_cpu() {
     use tensormass_runtime::gpu::GpuOptions;
     use tensormass_runtime::simulate::{Silent, run_on};
     use tensormass_runtime::target::Target;
-    let Some(gpu) = support::gpu::test_device() else { return };
+    let Some(gpu) = crate::support::gpu::test_device() else { return };
     let on_device = |scene: &Scene| {
         run_on(&Target::Gpu(Arc::clone(&gpu), GpuOptions::default()), scene, None, &mut Silent)
             .unwrap_or_else(|e| panic!("{e}"))

@@ -77,6 +77,7 @@ fn cpu<R: Precision>(body: &Body) -> (CpuBackend<R>, CpuField<R>) {
 }
 
 /// One on the CPU whose surfaces of triangles are grids, as a device has them.
+#[cfg(feature = "gpu")]
 pub fn tabulated<R: Precision>(scene: &Scene) -> OnCpu<R> {
     let mut model = build(scene).unwrap_or_else(|e| panic!("{e}"));
     model.body.contact = model.body.contact.map(|contact| Arc::new(contact.baked()));
