@@ -1,7 +1,5 @@
 //! Bodies that fall on obstacles, taken step by step on any backend.
 
-use std::sync::Arc;
-
 use tensormass_runtime::backend::{Backend, ForceField};
 use tensormass_runtime::body::Body;
 use tensormass_runtime::cg::CgLimits;
@@ -80,7 +78,7 @@ fn cpu<R: Precision>(body: &Body) -> (CpuBackend<R>, CpuField<R>) {
 #[cfg(feature = "gpu")]
 pub fn tabulated<R: Precision>(scene: &Scene) -> OnCpu<R> {
     let mut model = build(scene).unwrap_or_else(|e| panic!("{e}"));
-    model.body.contact = model.body.contact.map(|contact| Arc::new(contact.baked()));
+    model.body.contact = model.body.contact.map(|contact| std::sync::Arc::new(contact.baked()));
     Bench::of(model, scene, cpu)
 }
 
