@@ -49,6 +49,14 @@ pub fn cargo(arguments: &[&str]) -> Command {
     program(std::env::var_os("CARGO").unwrap_or_else(|| OsString::from("cargo")), arguments)
 }
 
+/// Options of cargo where what is built reads laws and computes nothing: optimising kernels would take minutes.
+pub const UNOPTIMISED: [&str; 4] = [
+    "--config",
+    "profile.dev.package.tensormass-kernels.opt-level=0",
+    "--config",
+    "profile.dev.package.tensormass-runtime.opt-level=0",
+];
+
 /// A call of a program, from the root.
 pub fn program(name: impl Into<OsString>, arguments: &[&str]) -> Command {
     let mut command = Command::new(name.into());

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use crate::process::{Failure, cargo, files, program, root, run, say, stems};
+use crate::process::{Failure, UNOPTIMISED, cargo, files, program, root, run, say, stems};
 
 /// The Python packages of the SymPy script, as .ci/run pins them.
 const PYTHON_PACKAGES: &str = "sympy==1.14.0 mpmath==1.3.0";
@@ -18,8 +18,9 @@ pub fn call(name: &str) -> Result<(), Failure> {
         return Err(Failure::Usage(format!("there is no laws/{name}.rs; the laws are: {}", laws.join(", "))));
     }
     let before = contents();
-    let derive = ["run", "--package", "tensormass", "--features", "derive", "--", "law", "derive", name];
-    run("derivation", cargo(&[&derive[..], &["--out", "laws/derived"]].concat()))?;
+    let tensormass = ["run", "--package", "tensormass", "--features", "derive"];
+    let derive = ["--", "law", "derive", name, "--out", "laws/derived"];
+    run("derivation", cargo(&[&tensormass[..], &UNOPTIMISED, &derive].concat()))?;
     let mut snapshots = cargo(&["test", "--package", "tensormass-kernels", "--test", "snapshots"]);
     // What differs is what is to be reviewed: it is written, and no reason to fail.
     snapshots.env("INSTA_UPDATE", "always").env("INSTA_FORCE_PASS", "1");

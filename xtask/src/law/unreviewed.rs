@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::process::{Failure, cargo, program, read, say};
+use crate::process::{Failure, UNOPTIMISED, cargo, program, read, say};
 
 /// Compares the committed files with what `tensormass law list --json` says of each law.
 ///
@@ -14,7 +14,8 @@ use crate::process::{Failure, cargo, program, read, say};
 pub fn call() -> Result<(), Failure> {
     let laws = committed("laws", "rs")?;
     let derivations = committed("laws/derived", "ir")?;
-    let list = ["run", "--quiet", "--package", "tensormass", "--features", "derive", "--", "law", "list", "--json"];
+    let run = ["run", "--quiet", "--package", "tensormass", "--features", "derive"];
+    let list = [&run[..], &UNOPTIMISED, &["--", "law", "list", "--json"]].concat();
     let reviewed = reviewed(&read("law list", cargo(&list))?)?;
     let mut faults = Vec::new();
     for law in &laws {
