@@ -12,7 +12,7 @@ fn mesh(name: &str, version: u32) -> Mesh {
 }
 
 /// The measure of a group of faces, or of the whole boundary.
-fn area(mesh: &Mesh, group: Option<&str>) -> f64 {
+pub fn area(mesh: &Mesh, group: Option<&str>) -> f64 {
     let members: Option<Vec<_>> = group.map(|name| {
         let mut faces = mesh.face_group(name).unwrap_or_else(|| panic!("no group {name}")).to_vec();
         faces.iter_mut().for_each(|face| face.sort_unstable());

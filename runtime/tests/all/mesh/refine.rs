@@ -4,27 +4,14 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use tensormass_runtime::mesh::gmsh::read;
-use tensormass_runtime::mesh::{Groups, Mesh, NodeId, Orientation, integrals};
+use tensormass_runtime::mesh::{Groups, Mesh, NodeId, Orientation};
 use tensormass_runtime::model::build;
 use tensormass_runtime::{elements, laws};
 
+use super::files::area;
 use super::two_tets;
 use crate::support::elements::{boxes_beside_wedges, distorted, unit};
 use crate::support::{done, parameters_text, probe, repository, scene};
-
-/// The measure of some faces.
-fn area(mesh: &Mesh, faces: &[Vec<NodeId>]) -> f64 {
-    let kinds = mesh.boundary().into_iter().map(|face| (mesh.face_nodes(face), mesh.face_kind(face)));
-    let wanted: BTreeSet<Vec<NodeId>> = faces.iter().map(|nodes| sorted(nodes)).collect();
-    let of = kinds.filter(|(nodes, _)| wanted.contains(&sorted(nodes)));
-    of.map(|(nodes, kind)| integrals(kind, &mesh.positions(&nodes)).iter().sum::<f64>()).sum()
-}
-
-fn sorted(nodes: &[NodeId]) -> Vec<NodeId> {
-    let mut nodes = nodes.to_vec();
-    nodes.sort_unstable();
-    nodes
-}
 
 /// Positions as whole numbers of a lattice so fine.
 fn places(mesh: &Mesh, nodes: &[NodeId], lattice: usize) -> BTreeSet<[i64; 3]> {
@@ -42,11 +29,11 @@ fn check(name: &str, mesh: &Mesh, n: usize, tolerance: f64) -> Mesh {
     assert_eq!(fine.nodes()[..mesh.nodes().len()], *mesh.nodes(), "{name}, {n}: nodes keep their numbers");
     assert_eq!(fine.parts(), mesh.parts(), "{name}, {n}");
     close("volume", fine.total_volume(), mesh.total_volume());
-    close("surface", area(&fine, &fine.boundary_faces()), area(mesh, &mesh.boundary_faces()));
+    close("surface", area(&fine, None), area(mesh, None));
     for (group, faces) in &mesh.groups().faces {
         let parts = fine.face_group(group).expect("it is kept");
         assert_eq!(parts.len(), faces.len() * n.pow(dimension - 1), "{name}, {n}: {group}");
-        close(group, area(&fine, parts), area(mesh, faces));
+        close(group, area(&fine, Some(group)), area(mesh, Some(group)));
         let of_faces: BTreeSet<NodeId> = parts.iter().flatten().copied().collect();
         let nodes = fine.node_group(group).expect("faces come with their nodes");
         assert!(nodes.iter().copied().eq(of_faces), "{name}, {n}: {group}");
