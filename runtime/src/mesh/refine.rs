@@ -35,8 +35,9 @@ impl Mesh {
                 return Err(MeshError::TooManyElements { elements, limit });
             }
         }
-        let patterns: Vec<Pattern> = self.blocks().iter().map(|block| Pattern::new(block.info(), n)).collect();
-        let mut nodes = Nodes::of(self, &patterns, n);
+        let whole = whole(self.blocks(), n);
+        let patterns: Vec<Pattern> = self.blocks().iter().map(|block| Pattern::new(block.info(), n, whole)).collect();
+        let mut nodes = Nodes::of(self, &patterns, whole);
         let mut blocks = vec![];
         for (block, pattern) in self.blocks().iter().zip(&patterns) {
             let mut children = vec![];
@@ -242,8 +243,8 @@ struct Pattern {
 }
 
 impl Pattern {
-    fn new(info: &ElementInfo, n: usize) -> Self {
-        let (shape, whole) = (Shape::of(info), whole(n));
+    fn new(info: &ElementInfo, n: usize, whole: u64) -> Self {
+        let shape = Shape::of(info);
         let corners = shape.corners();
         let key = |x: &[f64; 3]| -> Key {
             let weights = corners.iter().map(|corner| (shape.weight(corner, x) * whole as f64).round() as u64);
@@ -282,10 +283,14 @@ impl Pattern {
     }
 }
 
-/// The weight of a corner at itself. Weights are products of a simplex's and of up to three lines' functions, each a multiple of 1 over
-/// the places along an edge.
-fn whole(n: usize) -> u64 {
-    ((PLACES * n) as u64).pow(4)
+/// The weight of a corner at itself, of all elements alike. Weights are products of a simplex's function and one of each line, each a
+/// multiple of 1 over the places along an edge: of as many parts as can be numbered less than 2^40, which roundings do not reach.
+fn whole(blocks: &[Block], n: usize) -> u64 {
+    let factors = |block: &Block| {
+        let Shape { simplex, lines } = Shape::of(block.info());
+        lines + usize::from(simplex > 0)
+    };
+    ((PLACES * n) as u64).pow(blocks.iter().map(factors).max().unwrap_or(1) as u32)
 }
 
 /// The nodes of the parts, as far as they are numbered.
@@ -297,7 +302,7 @@ struct Nodes {
 
 impl Nodes {
     /// Those that there are before.
-    fn of(mesh: &Mesh, patterns: &[Pattern], n: usize) -> Self {
+    fn of(mesh: &Mesh, patterns: &[Pattern], whole: u64) -> Self {
         let mut numbers = HashMap::new();
         for (block, pattern) in mesh.blocks().iter().zip(patterns) {
             for element in block.elements() {
@@ -306,7 +311,7 @@ impl Nodes {
                 }
             }
         }
-        Self { positions: mesh.nodes().to_vec(), numbers, whole: whole(n) }
+        Self { positions: mesh.nodes().to_vec(), numbers, whole }
     }
 
     /// The numbers of an element's places.
